@@ -1,0 +1,47 @@
+# From a fresh clone every target sets up .venv by itself, once.
+PYTHON ?= python3
+PY := .venv/bin/python
+READY := .venv/.ready
+RECORDINGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-slow check bench lock clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(READY)  ## create .venv from requirements.lock (needs Python 3.11 or newer; PYTHON=... chooses one)
+
+$(READY): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "setup: $(PYTHON) is missing or older than 3.11; give a newer one with PYTHON=python3.12" >&2; exit 1; }
+	@test -x $(PY) || $(PYTHON) -m venv .venv
+	$(PY) -m pip install --quiet --requirement requirements.lock
+	$(PY) -m pip install --quiet --no-deps --editable .
+	@touch $@
+
+demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder identifies that robot instead
+	$(PY) -m wipx $(if $(RECORDINGS),task=identify "recordings.path='$(RECORDINGS)'",task=pipeline)
+
+test: $(READY)  ## run the tests (without the slow ones)
+	$(PY) -m pytest -q -m "not slow"
+
+test-slow: $(READY)  ## run the slow tests
+	$(PY) -m pytest -q -m slow
+
+check: $(READY)  ## lint, formatting and types
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m pyright
+
+bench: $(READY)  ## measure speed and memory
+	$(PY) benchmarks/run.py
+
+# Pins for every Python from 3.11 on and every platform; kept where they still fit, `UPGRADE=--upgrade` renews them.
+lock: $(READY)  ## renew requirements.lock after a change of pyproject.toml
+	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra bench --extra dev $(UPGRADE) \
+		--no-emit-index-url --no-emit-find-links --no-annotate --no-header --output-file requirements.lock pyproject.toml
+
+clean:  ## remove runs/, caches and .venv
+	rm -rf runs .venv .pytest_cache .ruff_cache .hypothesis dist build
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,51 @@
+"""Imports point one way, and heavy packages stay in their rooms."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent / "wipx"
+LAYERS = (
+    {"core"},
+    {"effects"},
+    {"sim"},
+    {"control", "identify", "learn", "hardware", "recordings", "report", "tracking"},
+    {"diagnose"},
+    {"tasks"},
+    {"config"},
+    {"app"},
+    {"__main__"},
+)
+RANK = {room: rank for rank, layer in enumerate(LAYERS) for room in layer}
+ALLOWED_IN = {
+    "mlflow": {"tracking"},
+    "hydra": {"config", "app", "__main__"},
+    "omegaconf": {"config", "app", "__main__"},
+    "pybullet": {"sim"},
+    "mujoco": {"sim"},
+    "torch": {"learn"},
+    "can": {"hardware"},
+}
+FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.name != "__init__.py")
+
+
+def _imports(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} line {node.lineno}: import by the full name"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_imports_point_one_way(path: Path):
+    room = path.relative_to(PACKAGE).with_suffix("").parts[0]
+    for name in _imports(path):
+        package, *inner = name.split(".")
+        assert room in ALLOWED_IN.get(package, {room}), f"{package} may be imported only in {ALLOWED_IN[package]}"
+        if package == "wipx" and inner[0] != room:
+            assert RANK[inner[0]] < RANK[room], f"{room} must not import {name}"
+            assert room != "report" or inner[0] == "core", f"report reads finished results only, not {name}"

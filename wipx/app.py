@@ -1,0 +1,214 @@
+"""The command line: composes the configuration, runs its task, and turns errors into exit statuses.
+
+What the configuration may hold is in `wipx.config`; what a run does is in `wipx.tasks`.
+"""
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException, MissingConfigException, OverrideParseException
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException, ValidationError
+
+from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
+from wipx.core.errors import InputError, unknown_name
+from wipx.tasks.job import Job
+
+ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
+DONE, DEFECT, INPUT_AT_FAULT, INTERRUPTED = 0, 1, 2, 130
+
+
+class JobFailed(BaseException):
+    """A single run failed; no `Exception`, so that Hydra does not add a report of its own.
+
+    Attributes:
+        error: Why.
+    """
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+def main() -> int:
+    """Run what the command line asks for.
+
+    Returns:
+        Exit status: 0 done; 1 a defect of the program; 2 the input or the configuration is at
+        fault; 130 interrupted.
+    """
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
+    # Hydra does not read overrides on both sides of the flag for a sweep.
+    sys.argv[1:] = sorted(sys.argv[1:], key=lambda argument: argument in ("-m", "--multirun"))
+    register()
+    started = time.time()
+
+    def run(config: DictConfig) -> None:
+        with _removed_if_left_empty(Path(HydraConfig.get().runtime.output_dir), started) as out:
+            _run_reported(config, out)
+
+    try:
+        hydra.main(version_base="1.3", config_path=str(configuration_folder()), config_name="config")(run)()
+    except JobFailed as failure:
+        return _report(failure.error, explanation(failure.error))
+    except OSError as error:
+        return _report(error, explanation(error) or _folder_at_fault(error))
+    except Exception as error:
+        return _report(error, explanation(error))
+    except KeyboardInterrupt:
+        print("interrupted; the run was not finished", file=sys.stderr)
+        return INTERRUPTED
+    except SystemExit as stop:  # after --help, or after Hydra has refused a flag
+        return INPUT_AT_FAULT if stop.code else DONE
+    return DONE
+
+
+def configuration_folder() -> Path:
+    """Where the YAML files are: inside an installed package, or beside the package in a checkout."""
+    package = Path(__file__).resolve().parent
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parent / "conf"
+
+
+def run_task(config: DictConfig, out: Path) -> None:
+    """Build the task of a composed configuration, run it, and save the configuration beside its results.
+
+    Args:
+        config: As composed, with the keys of `RunConfig`.
+        out: Folder that takes the results; it exists.
+
+    Raises:
+        InputError: the configuration or the input is at fault.
+    """
+    settings = _resolved(config)
+
+    @cache
+    def part(group: str) -> Any:
+        return build(settings[group], group)
+
+    model_path = settings["model"]["path"]
+    job = Job(
+        out=out,
+        seed=settings["seed"],
+        effects=tuple(settings["effects"]),
+        free=typed(settings["free"], dict[str, float | None], "free"),
+        bounds=_intervals(settings["bounds"]),
+        model_path=None if model_path is None else Path(model_path),
+        part=part,
+        settings=settings,
+    )
+    part("task").run(job)
+    OmegaConf.save(OmegaConf.create(settings), out / "config.yaml")
+
+
+def explanation(error: BaseException) -> str | None:
+    """One line that tells a user what to mend; None where the error is not the user's."""
+    cause = error.__cause__ if isinstance(error.__cause__, OmegaConfBaseException) else error
+    if isinstance(error, InputError):
+        text = str(error)
+    elif isinstance(error, MissingConfigException) and error.options:
+        group, _, option = str(error.missing_cfg_file).rpartition("/")
+        text = str(unknown_name("option", option, error.options, group))
+    elif isinstance(error, OverrideParseException):
+        detail = _without_details(error.message)
+        text = f"override {error.override!r}: {detail}; write KEY=VALUE, and quote special characters: 'KEY=\"VALUE\"'"
+    elif isinstance(cause, OmegaConfBaseException):
+        text = _value_at_fault(cause)
+    elif isinstance(error, HydraException):
+        text = _without_details(str(error))
+    else:
+        return None
+    return " ".join(text.split())
+
+
+def _run_reported(config: DictConfig, out: Path) -> None:
+    """Run the task; a failure leaves in the form that Hydra hands on without adding to it."""
+    try:
+        run_task(config, out)
+    except Exception as error:
+        if HydraConfig.get().mode is RunMode.RUN:
+            raise JobFailed(error) from error
+        if isinstance(error, InputError):
+            raise
+        raise RuntimeError(f"the job in {out} failed") from error
+
+
+@contextmanager
+def _removed_if_left_empty(out: Path, started: float) -> Iterator[Path]:
+    """The output folder; removed when the run fails, unless it has content or is older than the run."""
+    made_by_this_run = out.stat().st_mtime >= started
+    try:
+        yield out
+    except BaseException:
+        if made_by_this_run and not any(out.iterdir()):
+            out.rmdir()
+        raise
+
+
+def _resolved(config: DictConfig) -> dict[str, Any]:
+    """The configuration in plain containers, with the keys of `RunConfig` and no others."""
+    for key in map(str, config):
+        if key not in ROOT_KEYS:
+            raise unknown_key(key, ROOT_KEYS, "configuration")
+    for key in ROOT_KEYS:
+        if key not in config or OmegaConf.is_missing(config, key):
+            raise InputError(f"configuration: {key} is missing; give {key}=VALUE")
+    try:
+        return cast(dict[str, Any], OmegaConf.to_container(config, resolve=True))
+    except OmegaConfBaseException as error:
+        raise InputError(explanation(error)) from error
+
+
+def _intervals(bounds: Mapping[str, object]) -> dict[str, tuple[float, float]]:
+    intervals: dict[str, tuple[float, float]] = typed(bounds, dict[str, tuple[float, float]], "bounds")
+    for name, (low, high) in intervals.items():
+        if not low < high:
+            raise InputError(f"bounds.{name} is [{low:g}, {high:g}], expected [low, high] with low < high; correct it")
+    return intervals
+
+
+def _value_at_fault(error: OmegaConfBaseException) -> str:
+    """What is wrong with one key or its value."""
+    path = str(error.full_key)
+    parent, _, key = path.rpartition(".")
+    if isinstance(error, ConfigAttributeError | ConfigKeyError) and isinstance(error.parent_node, Mapping):
+        siblings = [str(name) for name in error.parent_node if name != "_target_"]
+        return str(unknown_key(key, siblings if parent else ROOT_KEYS, parent or "configuration"))
+    mistyped = mistyped_root_key(path, error.value) if isinstance(error, ValidationError) else None
+    return str(mistyped or f"{path}: {_without_details(str(error))}; correct it")
+
+
+def _without_details(message: str) -> str:
+    """The lines of a message of Hydra or OmegaConf that say what is wrong, joined."""
+    details = ("Error parsing override", "See https://", "full_key:", "object_type=", "reference_type=")
+    kept = []
+    for line in map(str.strip, message.splitlines()):
+        if line.startswith("Config search path"):
+            break
+        if line and not line.startswith(details):
+            kept.append(line)
+    return "; ".join(kept)
+
+
+def _folder_at_fault(error: OSError) -> str:
+    remedy = "choose another with hydra.run.dir=FOLDER, or hydra.sweep.dir=FOLDER for a sweep"
+    return f"output folder {error.filename}: {error.strerror}; {remedy}"
+
+
+def _report(error: Exception, line: str | None) -> int:
+    if line is None:
+        traceback.print_exception(error)
+        return DEFECT
+    print(line, file=sys.stderr)
+    return INPUT_AT_FAULT

@@ -1,0 +1,36 @@
+"""What an effect is: physics that can be missing from a nominal model, at a site."""
+
+from dataclasses import dataclass
+
+from wipx.core.parameters import Parameter
+
+JOINT_SITES = ("translation", "pitch", "joint1", "joint2")
+SENSOR_SITES = ("sensor_x", "sensor_theta", "sensor_theta1", "sensor_theta2")
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One kind of physics; its law stands in the module that defines it.
+
+    Attributes:
+        kind: Name in the vocabulary, e.g. "coulomb"; with a site it is "pitch/coulomb".
+        sites: Sites at which it can act.
+        parameters: Numbers of the law.
+        law: The equation, as text.
+        source: Paper or book.
+        excludes: Kinds that cannot act at the same site at the same time.
+        needs: Joints or plant parameters without which the effect has no meaning.
+    """
+
+    kind: str
+    sites: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    law: str
+    source: str
+    excludes: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Values at which the effect is absent [SI], by parameter name."""
+        return {p.name: p.neutral for p in self.parameters}

@@ -1,0 +1,16 @@
+"""Back-EMF of a voltage-driven motor: the force falls with speed.
+
+The same equation as `viscous` at the driven joint, but part of the motor's force: it counts as
+load for `load_friction` and is absent when the motor's leads are open.
+"""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="back_emf",
+    sites=("actuator",),
+    parameters=(Parameter("k_e", "force lost per speed, k_t^2/R at the joint", "damping", 0.0, 0.0, 3.0, 0.02),),
+    law="F = u - k_e v",
+    source="DC motor equation; Duclusaud, Passault 2025, arXiv:2410.08650",
+)

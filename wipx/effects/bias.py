@@ -1,0 +1,12 @@
+"""Zero offset of an angle sensor."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="bias",
+    sites=("sensor_theta", "sensor_theta1", "sensor_theta2"),
+    parameters=(Parameter("b", "recorded minus true angle", "angle", 0.0, -0.5, 0.5, 0.0),),
+    law="recorded = theta + b",
+    source="Woodman 2007, An introduction to inertial navigation, UCAM-CL-TR-696",
+)

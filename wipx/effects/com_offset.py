@@ -1,0 +1,13 @@
+"""Centre of mass beside the body axis: the body balances at an angle."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="com_offset",
+    sites=("geometry",),
+    parameters=(Parameter("theta_eq", "pitch at which the body balances", "angle", 0.0, -0.5, 0.5, 0.0),),
+    law="theta - theta_eq in place of theta",
+    source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
+    needs=("com_height",),
+)

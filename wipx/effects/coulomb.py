@@ -1,0 +1,12 @@
+"""Coulomb friction: a constant level against the motion, sticking at rest."""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="coulomb",
+    sites=JOINT_SITES,
+    parameters=(Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02),),
+    law="-F_c s(v), any force in [-F_c, F_c] at v = 0",
+    source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
+)

@@ -1,0 +1,19 @@
+"""Input dead zone: small commands produce no force."""
+
+from wipx.core.effect import Effect
+from wipx.core.law import clip, law
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="dead_zone",
+    sites=("actuator",),
+    parameters=(Parameter("band", "half width", "force", 0.0, 0.0, 0.5, 0.02),),
+    law="0 for abs(u) < band, else u - band s(u)",
+    source="Tao, Kokotovic 1996, Adaptive control of systems with actuator and sensor nonlinearities",
+)
+
+
+@law
+def force(u, band):
+    """Force for the command `u` [N or N m]."""
+    return u - clip(u, -band, band)

@@ -1,0 +1,12 @@
+"""Actuator gain: a force constant that differs from the believed one."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="gain",
+    sites=("actuator",),
+    parameters=(Parameter("k", "force per commanded force", "ratio", 1.0, 0.2, 5.0, 1.0),),
+    law="F = k u",
+    source="torque-constant error, BAM documentation of DC motors, github.com/Rhoban/bam",
+)

@@ -1,0 +1,12 @@
+"""First-order lag of the actuator (current loop, motor inductance)."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="lag",
+    sites=("actuator",),
+    parameters=(Parameter("tau", "time constant", "time", 0.0, 0.0, 0.3, 0.003),),
+    law="tau F' + F = u",
+    source="activation filter of actuators, MuJoCo documentation",
+)

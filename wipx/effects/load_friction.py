@@ -1,0 +1,25 @@
+"""Load-dependent gear friction: the level grows with the torques that the teeth carry.
+
+Model M5 of the extended friction models without its Stribeck part; that is the effect `stribeck`.
+"""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.law import law
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="load_friction",
+    sites=JOINT_SITES,
+    parameters=(
+        Parameter("K_motor", "friction per force of the motor", "ratio", 0.0, 0.0, 1.0, 0.05),
+        Parameter("K_external", "friction per force of the load", "ratio", 0.0, 0.0, 1.0, 0.05),
+    ),
+    law="-s(v) abs(K_external F_load - K_motor F_motor), sticking at v = 0",
+    source="Duclusaud, Passault 2025, Extended friction models for servo actuators, arXiv:2410.08650",
+)
+
+
+@law
+def level(motor, load, k_motor, k_external):
+    """Friction level for a `motor` force and the `load` of gravity and environment [N or N m]."""
+    return abs(k_external * load - k_motor * motor)

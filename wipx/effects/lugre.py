@@ -1,0 +1,23 @@
+"""LuGre friction: a damped bristle whose sliding level has a Stribeck peak.
+
+Canudas de Wit, Olsson, Astrom and Lischinsky (1995); its viscous term is the effect `viscous`.
+The bristle's laws are those of `presliding`.
+"""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="lugre",
+    sites=JOINT_SITES,
+    parameters=(
+        Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02),
+        Parameter("F_s", "static level, above F_c", "force", 0.0, 0.0, 1.0, 0.03),
+        Parameter("v_s", "Stribeck velocity", "velocity", 1.0, 2e-3, 1.0, 0.05),
+        Parameter("stiffness", "of the bristle", "stiffness", 1.0, 1e-2, 1e5, 100.0),
+        Parameter("damping", "of the bristle", "damping", 0.0, 0.0, 3.0, 0.01),
+    ),
+    law="-(stiffness z + damping z'), z' = v - stiffness abs(v) z / g(v), g = F_c + (F_s - F_c) exp(-(v/v_s)^2)",
+    source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3)",
+    excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding"),
+)

@@ -1,0 +1,17 @@
+"""A payload that comes during each recording, at time t0."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="payload_event",
+    sites=("geometry",),
+    parameters=(
+        Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05),
+        Parameter("height", "above the wheel axis", "length", 1.0, -1.0, 4.0, 1.0),
+        Parameter("t0", "when it comes", "moment", 0.0, 0.0, 1.0, 0.5),
+    ),
+    law="`payload` from t = t0 of each recording on",
+    source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
+    needs=("body_mass",),
+)

@@ -1,0 +1,19 @@
+"""Quadratic drag: a force against the motion, proportional to the square of the speed."""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.law import law
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="quadratic_drag",
+    sites=JOINT_SITES,
+    parameters=(Parameter("c", "drag coefficient", "drag", 0.0, 0.0, 3.0, 0.02),),
+    law="-c v abs(v)",
+    source="Kaheman, Kaiser, Strom, Kutz, Brunton 2019, arXiv:1909.08574",
+)
+
+
+@law
+def force(v, c):
+    """Drag on a joint of velocity `v` [N or N m]."""
+    return -c * v * abs(v)

@@ -1,0 +1,13 @@
+"""A rail that is not level: gravity pulls along it."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="rail_tilt",
+    sites=("environment",),
+    parameters=(Parameter("angle", "of the rail, positive where it rises towards +x", "angle", 0.0, -0.3, 0.3, 0.0),),
+    law="- (m_b + m_w) g sin(angle) on x; the coupling uses theta - angle",
+    source="rigid-body mechanics",
+    needs=("translation",),
+)

@@ -1,0 +1,12 @@
+"""Reflected rotor inertia: the motor's inertia times the square of the gear ratio, at the joint."""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="rotor_inertia",
+    sites=JOINT_SITES,
+    parameters=(Parameter("J", "reflected inertia", "inertia", 0.0, 0.0, 10.0, 0.1),),
+    law="-J v'",
+    source="Spong 1987, Modeling and control of elastic joint robots, ASME JDSMC 109(4)",
+)

@@ -1,0 +1,12 @@
+"""Saturation of the actuator's force."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="saturation",
+    sites=("actuator",),
+    parameters=(Parameter("F_max", "largest force", "force", 1e9, 0.05, 2.0, 0.8),),
+    law="F = clip(u, -F_max, F_max)",
+    source="force range of actuators, MuJoCo documentation",
+)

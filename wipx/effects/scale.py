@@ -1,0 +1,12 @@
+"""Scale error of a sensor."""
+
+from wipx.core.effect import SENSOR_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="scale",
+    sites=SENSOR_SITES,
+    parameters=(Parameter("e", "relative error", "ratio", 0.0, -0.3, 0.3, 0.0),),
+    law="recorded = (1 + e) true",
+    source="Woodman 2007, An introduction to inertial navigation, UCAM-CL-TR-696",
+)

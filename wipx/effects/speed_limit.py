@@ -1,0 +1,24 @@
+"""Torque-speed limit: the driving force falls to zero at the motor's free speed."""
+
+from wipx.core.effect import Effect
+from wipx.core.law import clip, law, maximum
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="speed_limit",
+    sites=("actuator",),
+    parameters=(
+        Parameter("F_stall", "largest force at rest", "force", 1e9, 0.05, 5.0, 1.0),
+        Parameter("v_free", "speed without load", "velocity", 1e9, 0.3, 20.0, 2.0),
+    ),
+    law="driving: abs(F) <= F_stall (1 - abs(v)/v_free); braking: abs(F) <= F_stall",
+    source="torque-speed line of a DC motor, BAM documentation, github.com/Rhoban/bam",
+)
+
+
+@law
+def limited(force, v, stall, free):
+    """The `force` that the motor can give at joint velocity `v` [N or N m]."""
+    driving = stall * maximum(1.0 - abs(v) / free, 0.0)
+    limit = driving if force * v > 0.0 else stall
+    return clip(force, -limit, limit)

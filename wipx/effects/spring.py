@@ -1,0 +1,16 @@
+"""A spring on the carriage: cable, hose or bumper."""
+
+from wipx.core.effect import Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="spring",
+    sites=("environment",),
+    parameters=(
+        Parameter("k", "stiffness", "stiffness", 0.0, 0.0, 3.0, 0.02),
+        Parameter("x0", "where it is relaxed", "coordinate", 0.0, -2.0, 2.0, 0.0),
+    ),
+    law="-k (x - x0)",
+    source="rigid-body mechanics",
+    needs=("translation",),
+)

@@ -1,0 +1,12 @@
+"""Viscous friction: a force against the motion, proportional to speed."""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="viscous",
+    sites=JOINT_SITES,
+    parameters=(Parameter("sigma", "viscous coefficient", "damping", 0.0, 0.0, 3.0, 0.02),),
+    law="-sigma v",
+    source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
+)

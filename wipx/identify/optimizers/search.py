@@ -1,0 +1,106 @@
+"""What every optimizer shares: its budget, its history, and how it is watched and stopped."""
+
+import time
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from wipx.core.results import SearchHistory
+from wipx.identify.problem import Problem
+
+
+class BudgetSpent(Exception):
+    """Ends a search from inside a library's loop; the best point so far is the result."""
+
+
+class Watcher(Protocol):
+    """Sees the progress of a search; raises KeyboardInterrupt to cancel it."""
+
+    def __call__(self, evaluations: int, seconds: float, best_loss: float) -> None:
+        """Called after every batch of evaluations."""
+        ...
+
+
+def unwatched(evaluations: int, seconds: float, best_loss: float) -> None:
+    """A watcher that looks away."""
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Result of a search.
+
+    Attributes:
+        cube: Best position in the unit cube, shape (D,).
+        loss: Its loss.
+        history: How it came about.
+        failed: Evaluations in which every prediction fell over.
+    """
+
+    cube: np.ndarray
+    loss: float
+    history: SearchHistory
+    failed: int
+
+
+class Optimizer(Protocol):
+    """A way to search the unit cube."""
+
+    def minimise(self, problem: Problem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
+        """The best position found within the budget; the same for the same generator state."""
+        ...
+
+
+@dataclass
+class Log:
+    """Counts evaluations and keeps the best position of one search.
+
+    Attributes:
+        optimizer: Name of the method.
+        evaluations: Budget.
+        seconds: Budget [s].
+        watcher: Told of every batch.
+    """
+
+    optimizer: str
+    evaluations: int
+    seconds: float
+    watcher: Watcher
+    began: float = field(default_factory=time.monotonic)
+    count: int = 0
+    failed: int = 0
+    best_loss: float = np.inf
+    best: np.ndarray | None = None
+    course: list[tuple[int, float, float]] = field(default_factory=list)
+
+    def add(self, cube: np.ndarray, losses: np.ndarray) -> None:
+        """Note the losses (P,) of positions (P, D).
+
+        Raises:
+            BudgetSpent: the budget of evaluations or seconds is used up.
+        """
+        self.count += len(losses)
+        self.failed += int(np.sum(~np.isfinite(losses)))
+        finite = np.where(np.isfinite(losses), losses, np.inf)
+        i = int(np.argmin(finite))
+        if finite[i] < self.best_loss:
+            self.best_loss, self.best = float(finite[i]), np.array(cube[i])
+        spent = time.monotonic() - self.began
+        self.course.append((self.count, spent, self.best_loss))
+        self.watcher(self.count, spent, self.best_loss)
+        if self.count >= self.evaluations or spent >= self.seconds:
+            raise BudgetSpent
+
+    def minimum(self, stopped: str) -> Minimum:
+        """The result so far."""
+        if self.best is None:
+            raise ValueError("a search needs at least one evaluation")
+        course = np.array(self.course)
+        history = SearchHistory(self.optimizer, course[:, 0].astype(int), course[:, 1], course[:, 2], stopped)
+        return Minimum(self.best, self.best_loss, history, self.failed)
+
+    def spent(self) -> str:
+        """Which budget ended the search."""
+        if self.count >= self.evaluations:
+            return f"budget of {self.evaluations} evaluations"
+        return f"budget of {self.seconds:g} s"

@@ -1,0 +1,254 @@
+"""Predictions of windows: estimate the state, then replay the recorded command.
+
+The state at a window's first row is the least-squares fit of the model itself to the rows
+that the window may see (a moving-horizon estimate without process noise; Rao, Rawlings and
+Mayne 2003). It therefore belongs to each candidate model: friction, lag and delay are settled
+by the time the prediction starts.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wipx.core.model import ModelBatch
+from wipx.identify.windows import Windows
+from wipx.sim.analytic import AnalyticSimulator
+
+# The estimate first sees this much of a window [s]: an unstable plant is linear in its first
+# state only for a short time.
+REACHES = (0.1, 0.2, 0.4)
+STEPS = 6  # Levenberg-Marquardt steps on all known rows, at most
+SETTLED = 1e-3  # relative fall of the squared residuals below which a window is through
+GUESS_SPAN = 0.08  # [s] of rows through which the first parabola goes
+FEWEST_ROWS = 4  # that a step sees in any case
+DIVERGED = 1e4  # in standard deviations; what a prediction that fell over counts
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What P models predict for R windows.
+
+    Attributes:
+        initial: Estimated state at each window's first row, shape (2 joints, P, R).
+        coordinates: Predicted recorded coordinates, shape (K + 1, joints, P, R).
+        floor: Standard deviation that sensor noise alone gives the prediction, through the
+            estimated state, shape (K + 1, joints, P, R); None unless asked for.
+    """
+
+    initial: np.ndarray
+    coordinates: np.ndarray
+    floor: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """Predicts windows with any model.
+
+    Attributes:
+        simulator: The engine.
+        windows: What to predict.
+        noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
+    """
+
+    simulator: AnalyticSimulator
+    windows: Windows
+    noise: np.ndarray
+
+    @cached_property
+    def _parabola(self) -> np.ndarray:
+        """Recorded coordinates and rates at each window's first row, by a parabola, shape (2 joints, R)."""
+        w = self.windows
+        joints = w.recorded.shape[1]
+        guess = np.zeros((2 * joints, w.count))
+        for r in range(w.count):
+            rows = np.flatnonzero(w.known[:, r])
+            t = w.inputs.t[rows, r] - w.inputs.t[rows[0], r]
+            count = max(FEWEST_ROWS, int(np.searchsorted(t, GUESS_SPAN)))
+            degree = min(2, len(rows) - 1)
+            fit = np.polynomial.polynomial.polyfit(t[:count], w.recorded[rows[:count], :, r], degree)
+            guess[:joints, r], guess[joints:, r] = fit[0], fit[1]
+        return guess
+
+    def first_guess(self, batch: ModelBatch) -> np.ndarray:
+        """States from a parabola through the first known rows, shape (2 joints, P, R)."""
+        true = np.repeat(self._parabola[:, None, :], batch.size, axis=1)
+        joints = len(true) // 2
+        for j, column in enumerate(batch.model.plant.coordinates):
+            effects = batch.model.effects
+            bias, scale = f"sensor_{column}/bias", f"sensor_{column}/scale"
+            if bias in effects:
+                true[j] -= batch.column(f"{bias}.b")[:, None]
+            if scale in effects:
+                true[[j, joints + j]] /= 1.0 + batch.column(f"{scale}.e")[:, None]
+        return true
+
+    def predict(self, batch: ModelBatch, *, floor: bool = False) -> Prediction:
+        """Estimate the states of all windows and predict them.
+
+        Args:
+            batch: P models.
+            floor: Whether to propagate the sensor noise too.
+        """
+        state = self.first_guess(batch)
+        for reach in self._reaches():
+            residuals, gain = self.state_gain(batch, state, reach)
+            state = state + self.correction(gain, residuals)
+        state, gain = self._settle(batch, state)
+        rollouts = self.simulator.replay(batch, self.windows.inputs, state)
+        spread = self._floor(batch, state, gain) if floor else None
+        return Prediction(state, rollouts.coordinates, spread)
+
+    def residuals(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Recorded minus predicted in standard deviations of the noise, zero outside of `rows`.
+
+        Args:
+            coordinates: Shape (K + 1, joints, P, R), or fewer rows.
+            rows: Which rows count, shape (K + 1, R).
+        """
+        n = len(coordinates)
+        scaled = self.windows.recorded[:n, :, None, :] - coordinates
+        scaled /= self.noise[None, :, None, None]
+        np.nan_to_num(scaled, copy=False, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
+        np.clip(scaled, -DIVERGED, DIVERGED, out=scaled)
+        scaled *= rows[:n, None, None, :]
+        return scaled
+
+    def state_gain(
+        self, batch: ModelBatch, state: np.ndarray, reach: float = np.inf
+    ) -> tuple[np.ndarray, "StateGain"]:
+        """Residuals of the known rows at a state, and their dependence on it.
+
+        Args:
+            batch: P models.
+            state: At each window's first row, shape (2 joints, P, R).
+            reach: Known rows later than this after the first do not count [s].
+
+        Returns:
+            Residuals, shape (K' + 1, joints, P, R), and the linearisation.
+        """
+        w = self.windows
+        known = w.known & self._within(reach)
+        inputs = w.inputs.until(_last_row(known))
+        size, names = batch.size, batch.names
+        steps = self._state_steps()
+        n = len(steps)
+        tiled = np.concatenate([state, *(state + _unit(steps, i) for i in range(n))], axis=1)
+        values = None if batch.values is None else np.tile(batch.values, (n + 1, 1))
+        wide = ModelBatch(batch.model, names, values if values is not None else np.zeros((n + 1, 0)))
+        out = self.simulator.replay(wide, inputs, tiled).coordinates
+        every = self.residuals(out, known).reshape(out.shape[0], out.shape[1], n + 1, size, w.count)
+        residuals = every[:, :, 0]
+        slopes = np.stack([(every[:, :, 1 + i] - residuals) / steps[i] for i in range(n)])
+        return residuals, StateGain(slopes, steps)
+
+    def correction(
+        self, gain: "StateGain", residuals: np.ndarray, damping: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Change of the state that the residuals of the known rows ask for, shape (2 joints, P, R).
+
+        Args:
+            gain: Linearisation at the state.
+            residuals: Of the known rows there.
+            damping: Levenberg-Marquardt damping of each window, shape (P, R).
+        """
+        right = np.einsum("akjpr,kjpr->pra", gain.slopes, residuals, optimize=True)
+        normal = gain.normal
+        diagonal = np.einsum("praa->pra", normal) * np.asarray(damping)[..., None]
+        normal = normal + diagonal[..., None] * np.eye(normal.shape[-1])
+        return -np.moveaxis(np.linalg.solve(normal, right[..., None])[..., 0], -1, 0)
+
+    def _settle(self, batch: ModelBatch, state: np.ndarray) -> tuple[np.ndarray, "StateGain"]:
+        """Levenberg-Marquardt steps on all known rows; a window keeps the best state it had."""
+        residuals, gain = self.state_gain(batch, state)
+        cost = np.sum(residuals**2, axis=(0, 1))
+        damping = np.zeros_like(cost)
+        for _ in range(STEPS):
+            trial = state + self.correction(gain, residuals, damping)
+            trial_residuals, trial_gain = self.state_gain(batch, trial)
+            trial_cost = np.sum(trial_residuals**2, axis=(0, 1))
+            better = trial_cost < cost
+            settled = np.abs(cost - trial_cost) <= SETTLED * cost
+            state = np.where(better, trial, state)
+            residuals = np.where(better, trial_residuals, residuals)
+            gain = StateGain(np.where(better, trial_gain.slopes, gain.slopes), gain.steps)
+            cost = np.where(better, trial_cost, cost)
+            damping = np.where(better, 0.1 * damping, np.maximum(10.0 * damping, 0.1))
+            if np.all(settled):
+                break
+        return state, gain
+
+    def known_residuals(self, batch: ModelBatch, state: np.ndarray) -> np.ndarray:
+        """Residuals of the known rows at a state, shape (K' + 1, joints, P, R)."""
+        inputs = self.windows.inputs.until(_last_row(self.windows.known))
+        return self.residuals(self.simulator.replay(batch, inputs, state).coordinates, self.windows.known)
+
+    def predicted_residuals(self, batch: ModelBatch, state: np.ndarray) -> np.ndarray:
+        """Residuals of the predicted rows at a state, shape (K + 1, joints, P, R)."""
+        out = self.simulator.replay(batch, self.windows.inputs, state)
+        return self.residuals(out.coordinates, self.windows.predicted)
+
+    def _reaches(self) -> tuple[float, ...]:
+        """Reaches that see less than all known rows."""
+        t = self.windows.inputs.t
+        span = float(np.max((t - self._first_times()) * self.windows.known))
+        return tuple(reach for reach in REACHES if reach < 0.8 * span)
+
+    def _first_times(self) -> np.ndarray:
+        t = self.windows.inputs.t
+        return t[self.windows.inputs.first, np.arange(t.shape[1])]
+
+    def _within(self, reach: float) -> np.ndarray:
+        """Rows up to `reach` after each window's first known one, and the fewest, shape (K + 1, R)."""
+        early = np.cumsum(self.windows.known, axis=0) <= FEWEST_ROWS
+        return early | (self.windows.inputs.t <= self._first_times() + reach)
+
+    def _state_steps(self) -> np.ndarray:
+        """Finite-difference steps of the state: a fraction of the noise, and ten times that per second."""
+        return np.concatenate([0.3 * self.noise, 3.0 * self.noise])
+
+    def _floor(self, batch: ModelBatch, state: np.ndarray, gain: "StateGain") -> np.ndarray:
+        """Spread of the prediction, by perturbing the estimated state along its covariance."""
+        covariance = np.linalg.inv(gain.normal)
+        base = self.simulator.replay(batch, self.windows.inputs, state).coordinates
+        factor = np.linalg.cholesky(covariance)
+        variance = np.zeros_like(base) + (self.noise**2)[None, :, None, None]
+        for i in range(factor.shape[-1]):
+            moved = state + np.moveaxis(factor[..., i], -1, 0)
+            variance += (self.simulator.replay(batch, self.windows.inputs, moved).coordinates - base) ** 2
+        return np.sqrt(variance)
+
+
+@dataclass(frozen=True)
+class StateGain:
+    """How the residuals of the known rows depend on the state at the window's first row.
+
+    Attributes:
+        slopes: Shape (2 joints, K' + 1, joints, P, R) [1 / unit of the state].
+        steps: Size of each state's finite-difference step.
+    """
+
+    slopes: np.ndarray
+    steps: np.ndarray
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Normal matrix, shape (P, R, 2 joints, 2 joints).
+
+        A joint that sticks tells nothing of its rate; a weak prior of ten thousand steps
+        keeps the matrix regular.
+        """
+        product = np.einsum("akjpr,bkjpr->prab", self.slopes, self.slopes, optimize=True)
+        return product + np.diag((1e-4 / self.steps) ** 2)
+
+
+def _last_row(rows: np.ndarray) -> np.ndarray:
+    """Last row of each column that counts, shape (R,)."""
+    return len(rows) - 1 - np.argmax(rows[::-1], axis=0)
+
+
+def _unit(steps: np.ndarray, i: int) -> np.ndarray:
+    step = np.zeros((len(steps), 1, 1))
+    step[i] = steps[i]
+    return step
+

@@ -1,0 +1,145 @@
+"""What an optimizer minimises: prediction errors of windows, as a function of the unit cube."""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from wipx.core.model import ModelBatch
+from wipx.identify.parameter_space import ParameterSpace
+from wipx.identify.prediction import Prediction, Predictor
+
+SLOPE_STEP = 1e-4  # of the search interval
+LARGEST_CALL = 4_000_000  # numbers of one batch of rollouts, about 32 MB
+
+
+class Problem(Protocol):
+    """A loss over the unit cube; least-squares problems also give residuals."""
+
+    @property
+    def space(self) -> ParameterSpace:
+        """The numbers that vary."""
+        ...
+
+    def losses(self, cube: np.ndarray) -> np.ndarray:
+        """Losses (P,) at positions (P, D): mean squared residual, 1 = the noise; inf where all fell over."""
+        ...
+
+
+class ResidualProblem(Problem, Protocol):
+    """A problem that least-squares methods can use."""
+
+    def residuals(self, cube: np.ndarray) -> np.ndarray:
+        """Residuals (N,) at a position (D,), in standard deviations."""
+        ...
+
+    def jacobian(self, cube: np.ndarray, size: np.ndarray | float = 0.0) -> np.ndarray:
+        """Their slopes (N, D), by differences over a `size` of each coordinate (D,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class WindowProblem:
+    """Prediction errors of all windows, the states re-estimated for every candidate.
+
+    Attributes:
+        space: The numbers that vary.
+        predictor: Windows and how to predict them; its `noise` weighs the signals.
+    """
+
+    space: ParameterSpace
+    predictor: Predictor
+
+    def losses(self, cube: np.ndarray) -> np.ndarray:
+        """Mean squared residual and priors of every candidate, shape (P,)."""
+        cube = np.atleast_2d(cube)
+        count = self._rows()
+        return np.array([np.sum(part**2) / count for part in self._residuals_of(cube)])
+
+    def residuals(self, cube: np.ndarray) -> np.ndarray:
+        """Residuals of the predicted rows, then of the priors, shape (N,)."""
+        return next(self._residuals_of(np.atleast_2d(cube)))
+
+    def jacobian(self, cube: np.ndarray, size: np.ndarray | float = 0.0) -> np.ndarray:
+        """Slopes of `residuals` by central differences, shape (N, D); the state follows the parameters.
+
+        Args:
+            cube: Position, shape (D,).
+            size: Finite-difference step of each coordinate; at least `SLOPE_STEP`. A sticking
+                joint answers in jumps, which a larger step averages.
+        """
+        reach = np.maximum(np.broadcast_to(size, cube.shape), SLOPE_STEP)
+        above, below = np.minimum(cube + reach, 1.0), np.maximum(cube - reach, 0.0)
+        moved = np.concatenate([_replaced(cube, above), _replaced(cube, below)])
+        base = self.space.batch(cube)
+        prediction = self.predictor.predict(base)
+        known, gain = self.predictor.state_gain(base, prediction.initial)
+        rows = []
+        for part in _chunks(len(moved), self._chunk()):
+            batch = self.space.batch(moved[part])
+            state = np.repeat(prediction.initial, batch.size, axis=1)
+            change = self.predictor.known_residuals(batch, state) - known
+            correction = [self.predictor.correction(gain, change[:, :, [i]]) for i in range(batch.size)]
+            state = state + np.concatenate(correction, axis=1)
+            rows.append(self._flat(self.predictor.predicted_residuals(batch, state)))
+        flat = np.concatenate(rows)
+        flat = np.concatenate([flat, self.space.prior_residuals(moved)], axis=1)
+        dimension = len(cube)
+        return ((flat[:dimension] - flat[dimension:]) / (above - below)[:, None]).T
+
+    def by_window(self, rows: np.ndarray) -> list[np.ndarray]:
+        """Indices of `residuals` that belong to each window; the priors are windows of their own.
+
+        Args:
+            rows: Any array of `residuals`' length, for its size.
+        """
+        windows = self.predictor.windows
+        joints = windows.recorded.shape[1]
+        window_of = np.broadcast_to(np.arange(windows.count), (len(windows.predicted), joints, windows.count))
+        labels = window_of[self._mask()]
+        groups = [np.flatnonzero(labels == r) for r in range(windows.count)]
+        return groups + [np.array([i]) for i in range(len(labels), len(rows))]
+
+    def reweighted(self, cube: np.ndarray) -> "WindowProblem":
+        """The same problem, each signal weighed by the error that it has at a position (D,)."""
+        residuals = self.residuals(cube)[: int(self._mask().sum())]
+        joints = self.predictor.windows.recorded.shape[1]
+        joint_of = np.broadcast_to(np.arange(joints)[:, None], self._mask().shape)[self._mask()]
+        rms = np.array([np.sqrt(np.mean(residuals[joint_of == j] ** 2)) for j in range(joints)])
+        return replace(self, predictor=replace(self.predictor, noise=self.predictor.noise * np.maximum(rms, 1e-3)))
+
+    def _rows(self) -> int:
+        return int(self._mask().sum())
+
+    def _mask(self) -> np.ndarray:
+        predicted = self.predictor.windows.predicted
+        joints = self.predictor.windows.recorded.shape[1]
+        return np.broadcast_to(predicted[:, None, :], (len(predicted), joints, predicted.shape[1]))
+
+    def _flat(self, residuals: np.ndarray) -> np.ndarray:
+        """From (K + 1, joints, P, R) to (P, N)."""
+        return np.moveaxis(residuals, 2, 0)[:, self._mask()]
+
+    def _chunk(self) -> int:
+        windows = self.predictor.windows
+        numbers = windows.recorded.size * (2 * windows.recorded.shape[1] + 1)
+        return max(1, LARGEST_CALL // numbers)
+
+    def _residuals_of(self, cube: np.ndarray):
+        for part in _chunks(len(cube), self._chunk()):
+            prediction: Prediction = self.predictor.predict(self.space.batch(cube[part]))
+            flat = self._flat(self.predictor.residuals(prediction.coordinates, self.predictor.windows.predicted))
+            priors = self.space.prior_residuals(cube[part])
+            for i in range(len(flat)):
+                yield np.concatenate([flat[i], priors[i]])
+
+
+def _replaced(cube: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Copies of a position (D,), in each of which one coordinate is replaced, shape (D, D)."""
+    copies = np.repeat(cube[None], len(cube), axis=0)
+    np.fill_diagonal(copies, values)
+    return copies
+
+
+def _chunks(count: int, size: int):
+    return (slice(i, min(i + size, count)) for i in range(0, count, size))

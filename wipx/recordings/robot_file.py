@@ -1,0 +1,144 @@
+"""robot.yaml: what the owner believes about a robot, before any recording was seen.
+
+Its model part (plant, parameters, effects) is read by `wipx.recordings.model_file`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from wipx.core.errors import InputError, unknown_name
+from wipx.core.model import Model
+from wipx.core.plant import Plant
+from wipx.recordings.model_file import ROBOT_KEYS, check_keys, mapping_of, model_from_mapping
+from wipx.recordings.signals import Signal, signal_from_mapping
+from wipx.recordings.strict_yaml import finite_number, load_mapping
+from wipx.recordings.units import COMMAND_UNITS, UNITS
+
+
+@dataclass(frozen=True)
+class ControllerDescription:
+    """The controller that ran while the robot was recorded.
+
+    Attributes:
+        kind: Name, e.g. "lqr".
+        gains: One row for each command, u = -K (q - q_ref) [force or torque per SI unit].
+        rate: Commands per second [Hz].
+    """
+
+    kind: str
+    gains: tuple[tuple[float, ...], ...]
+    rate: float
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """The owner's nominal model and how the robot was recorded.
+
+    Attributes:
+        model: Plant, parameters and the effects that the owner already has.
+        uncertainty: Relative standard deviation by plant parameter or "site/kind.symbol"; what is
+            not listed is exact.
+        controller: None where the owner gives none.
+        signals: Columns of contract section 1 that the log has under another name, unit or sign.
+    """
+
+    model: Model
+    uncertainty: Mapping[str, float]
+    controller: ControllerDescription | None
+    signals: Mapping[str, Signal]
+
+    def __reduce__(self):
+        # Mapping proxies do not pickle; rebuild from plain dictionaries.
+        return RobotDescription, (self.model, dict(self.uncertainty), self.controller, dict(self.signals))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "uncertainty", MappingProxyType(dict(self.uncertainty)))
+        object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+
+
+def read_robot(path: Path) -> RobotDescription:
+    """The description in a robot.yaml.
+
+    Raises:
+        InputError: the file is missing or no plain YAML, or its content is at fault.
+    """
+    return robot_from_mapping(load_mapping(path), str(path))
+
+
+def robot_from_mapping(data: Mapping[str, object], where: str) -> RobotDescription:
+    """The description that the keys of a robot.yaml give.
+
+    Args:
+        data: Content of the file, or the same keys in a configuration.
+        where: File or key that holds it, for messages.
+
+    Raises:
+        InputError: a key, parameter, effect, column or unit is unknown, missing or at fault.
+    """
+    check_keys(data, ROBOT_KEYS, where)
+    model = model_from_mapping(data, where)
+    listed = mapping_of(data, "signals", where)
+    signals = {n: signal_from_mapping(n, listed[n], model.plant, f"{where}: signals") for n in listed}
+    uncertainty = _uncertainty(mapping_of(data, "uncertainty", where), model, f"{where}: uncertainty")
+    known = {*mapping_of(data, "parameters", where), *uncertainty}
+    _check_input_gain(signals, model.plant, given="input_gain" in known, where=where)
+    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals)
+
+
+def _check_input_gain(signals: Mapping[str, Signal], plant: Plant, *, given: bool, where: str) -> None:
+    """A command in volts or without unit needs a gain to become a force or a torque."""
+    for name in plant.commands:
+        if name in signals and UNITS[signals[name].unit].si in COMMAND_UNITS and not given:
+            unit = signals[name].unit
+            raise InputError(
+                f"{where}: {name} is in {unit}, so parameters.input_gain [{plant.unit_of(name)} per {unit}] is needed"
+            )
+
+
+def _uncertainty(data: Mapping[str, object], model: Model, where: str) -> dict[str, float]:
+    symbols = [f"{name}.{symbol}" for name, values in model.effects.items() for symbol in values]
+    valid = (*model.parameters, *symbols)
+    stds = {}
+    for name, given in data.items():
+        if name not in valid:
+            raise unknown_name("parameter", name, valid, where)
+        std = finite_number(given)
+        if std is None or std <= 0.0:
+            raise InputError(f"{where}: {name} is {given!r}, expected a relative standard deviation above 0, e.g. 0.1")
+        if model.value(name) == 0.0:
+            raise InputError(f"{where}: {name} is relative, but the value itself is 0; give a value or drop it")
+        stds[name] = std
+    return stds
+
+
+def _controller(data: Mapping[str, object], plant: Plant, where: str) -> ControllerDescription | None:
+    content = mapping_of(data, "controller", where)
+    if not content:
+        return None
+    where = f"{where}: controller"
+    check_keys(content, ("kind", "gains", "rate"), where)
+    for key in ("kind", "gains", "rate"):
+        if key not in content:
+            raise InputError(f"{where} lacks {key}; expected kind, gains and rate [Hz]")
+    kind, rate = content["kind"], finite_number(content["rate"])
+    if not isinstance(kind, str):
+        raise InputError(f"{where}: kind is {kind!r}, expected a name such as lqr")
+    if rate is None or rate <= 0.0:
+        raise InputError(f"{where}: rate is {content['rate']!r}, expected a frequency above 0 Hz")
+    return ControllerDescription(kind, _gains(content["gains"], len(plant.commands), where), rate)
+
+
+def _gains(data: object, commands: int, where: str) -> tuple[tuple[float, ...], ...]:
+    rows = data if isinstance(data, list | tuple) else []
+    if rows and not any(isinstance(row, list | tuple) for row in rows):
+        rows = [rows]
+    if len(rows) != commands or not all(_is_gain_row(row) for row in rows):
+        expected = "a list of numbers" if commands == 1 else f"{commands} lists of numbers, one per command"
+        raise InputError(f"{where}: gains is {data!r}, expected {expected}")
+    return tuple(tuple(float(gain) for gain in row) for row in rows)
+
+
+def _is_gain_row(row: object) -> bool:
+    return isinstance(row, list | tuple) and len(row) > 0 and all(finite_number(gain) is not None for gain in row)

@@ -1,0 +1,144 @@
+"""The numbers behind the page's charts, as plain data for its script; how they look is up to the script."""
+
+import base64
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from wipx.core.results import FitErrors, IdentificationResult, SearchHistory, Trace
+from wipx.report.numbers import scale_for, significant
+from wipx.report.outcome import SignalErrors, error_scale, judged_fit, signal_errors
+from wipx.report.traces import break_at_restarts, decimate, prediction_error
+
+MOST_ROWS = 4000  # rows of one trace; more than a screen has pixels
+MOST_VALUES = 180_000  # in all charts: 1 MB of the page, beside 5 MB of plotly.js
+MOST_TRACES = 12
+
+
+def shown_traces(result: IdentificationResult) -> tuple[Trace, ...]:
+    """The traces that the page shows: held-out ones first, `MOST_TRACES` at most."""
+    return tuple(sorted(result.traces, key=lambda trace: not trace.held_out))[:MOST_TRACES]
+
+
+def row_limit(traces: tuple[Trace, ...]) -> int:
+    """Rows that each trace may have, so that the page stays small."""
+    columns = sum(1 + len(trace.command) + 3 * len(trace.recorded) for trace in traces)
+    return min(MOST_ROWS, MOST_VALUES // max(columns, 1))
+
+
+def chart_data(result: IdentificationResult) -> dict:
+    """Everything that the page's script draws; holds only what JSON can, nothing infinite."""
+    traces = shown_traces(result)
+    limit = row_limit(traces)
+    return {
+        "traces": [_trace(result, trace, limit) for trace in traces],
+        "errors": _errors(signal_errors(result)),
+        "search": _search(result.history),
+    }
+
+
+def _trace(result: IdentificationResult, trace: Trace, limit: int) -> dict:
+    shown = break_at_restarts(decimate(trace, limit))
+    return {
+        "caption": _caption(result, trace, len(decimate(trace, limit).t)),
+        "t": _packed(shown.t),
+        "signals": [_signal(result, shown, column) for column in shown.recorded],
+        "commands": [_command(result, column, values) for column, values in shown.command.items()],
+    }
+
+
+def _signal(result: IdentificationResult, shown: Trace, column: str) -> dict:
+    recorded = shown.recorded[column]
+    scale = scale_for([_largest(recorded)], result.units.get(column, ""))
+    errors = error_scale(result, column)
+    return {
+        "name": column,
+        "factor": scale.factor,
+        "unit": scale.unit,
+        "errorFactor": errors.factor,
+        "errorUnit": errors.unit,
+        "noiseFloor": _number(_floors(judged_fit(result), column)),
+        "recorded": _packed(recorded),
+        "nominal": _packed(shown.nominal[column]),
+        "completed": _packed(shown.completed[column]),
+    }
+
+
+def _command(result: IdentificationResult, column: str, values: np.ndarray) -> dict:
+    scale = scale_for([_largest(values)], result.units.get(column, ""))
+    return {"name": column, "factor": scale.factor, "unit": scale.unit, "values": _packed(values)}
+
+
+def _caption(result: IdentificationResult, trace: Trace, rows: int) -> str:
+    """The errors of one recording, and whether it is drawn with fewer points than it has."""
+    nominal, completed = prediction_error(trace, trace.nominal), prediction_error(trace, trace.completed)
+    changes = []
+    for column in trace.recorded:
+        scale = error_scale(result, column)
+        before, after = significant(scale.factor * nominal[column]), significant(scale.factor * completed[column])
+        changes.append(f"{column} {before} \N{RIGHTWARDS ARROW} {after} {scale.unit}")
+    kind = "Held-out" if trace.held_out else "Used for the fit"
+    thinned = "" if rows == len(trace.t) else f" Drawn with {rows} of {len(trace.t)} rows; peaks are kept."
+    return f"{kind}. Error in this recording: {', '.join(changes)}.{thinned}"
+
+
+def _errors(rows: tuple[SignalErrors, ...]) -> list[dict]:
+    """One chart per signal; its groups are the kinds of recordings."""
+    charts = []
+    for signal in dict.fromkeys(row.signal for row in rows):
+        group = [row for row in rows if row.signal == signal]
+        values = [(row.nominal, row.completed, row.noise_floor) for row in group]
+        charts.append(
+            {
+                "signal": signal,
+                "unit": group[0].scale.unit,
+                "recordings": [row.recordings for row in group],
+                "nominal": [_number(row.nominal) for row in group],
+                "completed": [_number(row.completed) for row in group],
+                "noiseFloor": [_number(row.noise_floor) for row in group],
+                "nominalText": [significant(row.nominal) for row in group],
+                "completedText": [significant(row.completed) for row in group],
+                "noiseFloorText": [significant(row.noise_floor) for row in group],
+                "logarithmic": wants_logarithm(value for row in values for value in row),
+            }
+        )
+    return charts
+
+
+def wants_logarithm(values: Iterable[float], ratio: float = 10.0) -> bool:
+    """Whether values want a logarithmic axis: none negative, the largest above the least positive by `ratio`."""
+    finite = [value for value in values if math.isfinite(value)]
+    positive = [value for value in finite if value > 0.0]
+    return bool(positive) and min(finite) >= 0.0 and max(positive) > ratio * min(positive)
+
+
+def _search(history: SearchHistory) -> dict | None:
+    if len(history.evaluations) == 0:
+        return None
+    return {
+        "evaluations": [int(count) for count in history.evaluations],
+        "seconds": [_number(time) for time in history.seconds],
+        "bestLoss": [_number(loss) for loss in history.best_loss],
+        "logarithmic": wants_logarithm(history.best_loss.tolist()),
+    }
+
+
+def _floors(errors: FitErrors, column: str) -> float:
+    return errors.noise_floor.get(column, math.nan)
+
+
+def _largest(values: np.ndarray) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max(initial=0.0))
+
+
+def _number(value: float) -> float | None:
+    """A number that JSON can hold; None for NaN and infinities."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _packed(values: np.ndarray) -> str:
+    """Little-endian 32-bit floats in base64: a third of the size of their decimal digits."""
+    with np.errstate(over="ignore"):
+        return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")

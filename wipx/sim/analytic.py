@@ -1,0 +1,227 @@
+"""The analytic simulator: thousands of rollouts at once in compiled code.
+
+A rollout is one model on one window of inputs. Open loop it replays commands; closed loop a
+state feedback computes them at the rows of the window, from what the sensors show. Controllers
+that are Python objects drive the same code row by row (`drive`).
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.core.model import Model, ModelBatch
+from wipx.core.plant import Plant
+from wipx.sim import rows as R
+from wipx.sim.coefficients import coefficients, joint_index
+from wipx.sim.inputs import Inputs
+from wipx.sim.kernel import W, rollout
+
+LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
+NO_FEEDBACK = np.zeros((1, 4, 1))
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """What P models did on R windows.
+
+    Attributes:
+        coordinates: As the sensors show them, shape (K + 1, joints, P, R) [m, rad].
+        rates: True rates, shape (K + 1, joints, P, R) [m/s, rad/s].
+        commands: Commands of each row, shape (K, inputs, P, R) (R only open loop: (K, inputs, 1, R)).
+    """
+
+    coordinates: np.ndarray
+    rates: np.ndarray
+    commands: np.ndarray
+
+
+@dataclass(frozen=True)
+class StateFeedback:
+    """u = -K (y - y_ref), y = [coordinates, rates] as measured, limited to +-`limit`.
+
+    Attributes:
+        gains: Shape (inputs, 2 joints) [N or N m per unit].
+        rate_filter: Time constant of the low-pass on differenced coordinates [s]; None where
+            the rates themselves are measured.
+        limit: Largest command [N or N m].
+    """
+
+    gains: np.ndarray
+    rate_filter: float | None = None
+    limit: float = np.inf
+
+
+@dataclass(frozen=True)
+class AnalyticSimulator:
+    """The compiled simulator; `wipx.sim.kernel` holds its physics.
+
+    Attributes:
+        step: Longest step of the integrator [s]; rows further apart are divided evenly.
+        threads: Threads of a large batch; 0 takes all cores.
+        smoothing: Speed over which the dry friction of each joint builds up, shape (joints,)
+            [m/s, rad/s]; empty for true sticking. Only searches use it, on their way.
+    """
+
+    step: float = 1e-3
+    threads: int = 0
+    smoothing: tuple[float, ...] = ()
+
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+        """Open loop: the recorded commands act on every model.
+
+        Args:
+            batch: P models.
+            inputs: R windows.
+            initial: True coordinates, then rates, at each window's first integrated row,
+                shape (2 joints, P, R) [m, rad, m/s, rad/s].
+        """
+        run = _Run(self, batch, inputs)
+        states = run.states(initial)
+        run.advance(states, 0, run.rows)
+        return run.rollouts(inputs.commands[:, :, None, :])
+
+    def close_loop(
+        self,
+        batch: ModelBatch,
+        inputs: Inputs,
+        initial: np.ndarray,
+        feedback: StateFeedback,
+        references: np.ndarray,
+        noise: np.ndarray | None = None,
+    ) -> Rollouts:
+        """Closed loop: the feedback computes the command at every row.
+
+        Args:
+            batch: P models.
+            inputs: Rows of the controller; its commands are ignored.
+            initial: As in `replay`.
+            feedback: The controller.
+            references: Of coordinates and rates, shape (K, 2 joints, R).
+            noise: Added to what the controller measures, shape (K, 2 joints, P, R).
+        """
+        run = _Run(self, batch, inputs)
+        states = run.states(initial)
+        commands = np.zeros((run.rows, 2, run.lanes))
+        pattern = run.pattern
+        gains = np.zeros((2, 4))
+        driven = [joint_index(site) for site in batch.model.plant.actuated]
+        gains[np.ix_(driven, pattern)] = feedback.gains
+        wide = np.zeros((run.rows, 4, inputs.windows))
+        wide[:, pattern] = references
+        noise_rows = np.zeros((run.rows, 4, run.lanes))
+        if noise is not None:
+            noise_rows[:, pattern] = noise.reshape(run.rows, len(pattern), run.lanes)
+        smoothing = -1.0 if feedback.rate_filter is None else feedback.rate_filter
+        settings = np.array([smoothing, feedback.limit])
+        run.advance(states, 0, run.rows, commands, (gains, wide, noise_rows, settings))
+        shaped = commands[:, driven].reshape(run.rows, len(driven), batch.size, inputs.windows)
+        return run.rollouts(shaped)
+
+    def drive(
+        self, model: Model, inputs: Inputs, initial: np.ndarray, controller: Callable[[float, np.ndarray], np.ndarray]
+    ) -> Rollouts:
+        """Closed loop with any controller, one row at a time.
+
+        Args:
+            model: The robot.
+            inputs: One window: the rows at which the controller runs.
+            initial: True coordinates, then rates, shape (2 joints,).
+            controller: Called with the time [s] and the measured coordinates and rates
+                (2 joints,); returns the commands (inputs,).
+        """
+        run = _Run(self, ModelBatch(model), inputs)
+        states = run.states(initial[:, None, None])
+        commands = np.zeros((run.rows, 2, 1))
+        driven = [joint_index(site) for site in model.plant.actuated]
+        run.advance(states, 0, 0, commands)
+        for k in range(run.rows):
+            measured = run.out[k, run.pattern, 0]
+            commands[k, driven, 0] = controller(float(inputs.t[k, 0]), measured)
+            run.advance(states, k, k + 1, commands)
+        return run.rollouts(commands[:, driven, :, None])
+
+
+class _Run:
+    """One call of the kernel: its arrays, in the kernel's layout."""
+
+    def __init__(self, simulator: AnalyticSimulator, batch: ModelBatch, inputs: Inputs) -> None:
+        self.plant: Plant = batch.model.plant
+        self.inputs = inputs
+        self.batch = batch
+        self.simulator = simulator
+        self.coefficients = coefficients(batch)
+        for site, speed in zip(self.plant.joints, simulator.smoothing, strict=False):
+            self.coefficients.rows[R.SMOOTHING + joint_index(site)] = speed
+        self.rows = len(inputs.t) - 1
+        self.lanes = batch.size * inputs.windows
+        joints = [joint_index(site) for site in self.plant.joints]
+        self.joints = joints
+        self.pattern = [*joints, *(2 + j for j in joints)]
+        self.substeps = inputs.substeps(simulator.step)
+        self.out = np.zeros((self.rows + 1, 4, self.lanes))
+        late = bool(self.coefficients.present[R.ON_SENSOR_DELAY])
+        self.past = np.zeros((self.rows + 1, 4, self.lanes) if late else (1, 4, 1))
+
+    def states(self, initial: np.ndarray) -> np.ndarray:
+        states = np.zeros((R.STATES, self.lanes))
+        states[self.pattern] = np.broadcast_to(
+            initial, (len(self.pattern), self.batch.size, self.inputs.windows)
+        ).reshape(len(self.pattern), self.lanes)
+        return states
+
+    def advance(self, states, first_row, last_row, commands=None, feedback=None) -> None:
+        """Simulate rows; `commands` (K, 2, lanes) are per lane, otherwise the inputs' own are replayed."""
+        per_lane = commands is not None
+        if commands is None:
+            commands = np.zeros((self.rows, 2, self.inputs.windows))
+            driven = [joint_index(site) for site in self.plant.actuated]
+            commands[:, driven] = self.inputs.commands
+        closed = feedback is not None
+        gains, references, noise, settings = feedback or (np.zeros((2, 4)), NO_FEEDBACK, NO_FEEDBACK, np.zeros(2))
+
+        def work(begin: int, end: int) -> None:
+            rollout(
+                self.coefficients.rows,
+                self.coefficients.present,
+                self.coefficients.actuated,
+                states,
+                self.inputs.t,
+                commands,
+                self.substeps,
+                per_lane,
+                closed,
+                gains,
+                references,
+                noise,
+                settings,
+                self.past,
+                self.out,
+                first_row,
+                last_row,
+                begin,
+                end,
+            )
+
+        bounds = self._shares(first_row, last_row)
+        if len(bounds) == 2:
+            work(*bounds)
+            return
+        with ThreadPoolExecutor(len(bounds) - 1) as pool:
+            list(pool.map(work, bounds[:-1], bounds[1:]))
+
+    def _shares(self, first_row: int, last_row: int) -> list[int]:
+        """Lane bounds of the threads, in whole blocks."""
+        threads = self.simulator.threads or os.cpu_count() or 1
+        steps = self.lanes * int(self.substeps[first_row:last_row].max(axis=1, initial=0).sum())
+        blocks = -(-self.lanes // W)
+        shares = max(1, min(threads, blocks, steps // LEAST_WORK_PER_THREAD))
+        return [min(self.lanes, W * (blocks * i // shares)) for i in range(shares)] + [self.lanes]
+
+    def rollouts(self, commands: np.ndarray) -> Rollouts:
+        shape = (self.rows + 1, len(self.joints), self.batch.size, self.inputs.windows)
+        coordinates = self.out[:, self.joints].reshape(shape)
+        rates = self.out[:, [2 + j for j in self.joints]].reshape(shape)
+        return Rollouts(coordinates, rates, commands)

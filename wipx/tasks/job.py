@@ -1,0 +1,33 @@
+"""What a task is given: the settings of one run, and the swappable parts it may ask for."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of a task.
+
+    Attributes:
+        out: Folder that takes the results; it exists.
+        seed: Of every random number.
+        effects: Physics that is switched on, as "site/kind".
+        free: Further parameters that may change, with the relative standard deviation of their
+            prior; None without a prior.
+        bounds: Search intervals (low, high) that replace the usual ones, by parameter [SI].
+        model_path: A model.yaml to start from; None for the nominal model.
+        part: Gives the chosen part of a group, e.g. `part("optimizer")`. It is built when it is
+            first asked for, so that a part that is never used costs nothing.
+        settings: The whole configuration in plain containers, for logging.
+    """
+
+    out: Path
+    seed: int
+    effects: tuple[str, ...]
+    free: Mapping[str, float | None]
+    bounds: Mapping[str, tuple[float, float]]
+    model_path: Path | None
+    part: Callable[[str], Any]
+    settings: Mapping[str, Any]
