@@ -5,6 +5,7 @@ from scipy import stats
 
 from wipx.identify.problem import SLOPE_STEP, WindowProblem
 
+SMOOTHING = 0.01  # share of the joints' speeds over which dry friction builds up
 ROUNDS = 3  # of matching the finite-difference step to the deviation that it yields
 
 
@@ -13,15 +14,16 @@ def covariance(problem: WindowProblem, cube: np.ndarray) -> tuple[np.ndarray, in
 
     Clustered sandwich (White 1982; Liang and Zeger 1986): the scores of whole windows are the
     independent pieces, so errors may be coloured within a window and grow along it, and the
-    noise level need not be known. Slopes are secants over about one standard deviation, since a
-    sticking joint answers in jumps.
+    noise level need not be known. Slopes are secants over about one standard deviation on a
+    slightly smoothed problem, since a sticking joint answers in jumps.
     """
     residuals = problem.residuals(cube)
     groups = problem.by_window(residuals)
+    smooth = problem.smoothed(SMOOTHING)
     step = np.full(len(cube), SLOPE_STEP)
     matrix = np.zeros((len(cube), len(cube)))
     for _ in range(ROUNDS):
-        matrix = _sandwich(problem.jacobian(cube, step), residuals, groups)
+        matrix = _sandwich(smooth.jacobian(cube, step), residuals, groups)
         step = np.clip(np.sqrt(np.diag(matrix)), 1e-6, 0.2)
     return matrix, len(groups)
 

@@ -29,6 +29,10 @@ class Problem(Protocol):
 class ResidualProblem(Problem, Protocol):
     """A problem that least-squares methods can use."""
 
+    def smoothed(self, level: float) -> "ResidualProblem":
+        """The same problem with dry friction smoothed by `level`; 0 for the problem itself."""
+        ...
+
     def residuals(self, cube: np.ndarray) -> np.ndarray:
         """Residuals (N,) at a position (D,), in standard deviations."""
         ...
@@ -45,10 +49,18 @@ class WindowProblem:
     Attributes:
         space: The numbers that vary.
         predictor: Windows and how to predict them; its `noise` weighs the signals.
+        speeds: What each joint reaches, shape (joints,) [m/s or rad/s]; measures the smoothing.
     """
 
     space: ParameterSpace
     predictor: Predictor
+    speeds: tuple[float, ...]
+
+    def smoothed(self, level: float) -> "WindowProblem":
+        """The same problem with dry friction that builds up over a share `level` of the joints' speeds."""
+        smoothing = tuple(level * speed for speed in self.speeds)
+        simulator = replace(self.predictor.simulator, smoothing=smoothing)
+        return replace(self, predictor=replace(self.predictor, simulator=simulator))
 
     def losses(self, cube: np.ndarray) -> np.ndarray:
         """Mean squared residual and priors of every candidate, shape (P,)."""

@@ -1,4 +1,9 @@
-"""Bounded Gauss-Newton with several starts (SciPy's trust-region reflective method)."""
+"""Bounded Gauss-Newton with several starts and smoothing continuation (SciPy's TRF method).
+
+A joint that sticks answers to its parameters in jumps, in which Gauss-Newton gets stuck. Each
+search therefore begins with friction that builds up over a wide range of speed, follows the
+minimum while that range shrinks, and ends with true sticking.
+"""
 
 from dataclasses import dataclass
 
@@ -8,27 +13,28 @@ from scipy import optimize
 from wipx.identify.optimizers.search import BudgetSpent, Log, Minimum, Watcher, unwatched
 from wipx.identify.problem import ResidualProblem
 
+SECANT = 0.02  # finite-difference step relative to the distance from the neutral value
+
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Least squares from the best of the model's own start, the neutral one and a random sample.
+    """Least squares from the model's own start and from the best of a random sample.
 
     Attributes:
         starts: How many searches are made.
-        sample: Random positions among which the starts are chosen.
-        iterations: Steps of one search at most.
-        secants: Finite-difference steps of successive searches, relative to the distance from the
-            neutral value: wide ones see past the jumps of sticking joints, narrow ones end precisely.
-        tolerance: Relative change of the loss or of a parameter that ends one.
+        sample: Random positions among which the further starts are chosen.
+        iterations: Steps at each level of smoothing, at most.
+        smoothing: Successive levels, in shares of the joints' speeds; ends with 0.
+        tolerance: Relative change of the loss or of a parameter that ends a level.
         evaluations: Budget of loss evaluations, those of slopes included.
         seconds: Budget of time [s].
     """
 
-    starts: int = 3
-    sample: int = 48
+    starts: int = 2
+    sample: int = 32
     iterations: int = 30
-    secants: tuple[float, ...] = (0.2, 0.02)
-    tolerance: float = 1e-6
+    smoothing: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01, 0.003, 0.0)
+    tolerance: float = 1e-5
     evaluations: int = 20_000
     seconds: float = 1800.0  # the paper's cap, Sec. VI-C
 
@@ -37,30 +43,39 @@ class LeastSquares:
         log = Log("least_squares", self.evaluations, self.seconds, watcher)
         try:
             for start in self._starts(problem, rng, log):
-                for secant in self.secants:
-                    start = self._search(problem, start, secant, log)
+                self._follow(problem, start, log)
         except BudgetSpent:
             return log.minimum(log.spent())
         return log.minimum("converged")
 
     def _starts(self, problem: ResidualProblem, rng: np.random.Generator, log: Log) -> np.ndarray:
         own = np.stack([problem.space.start, problem.space.neutral])
-        cube = own if self.starts == 1 else np.concatenate([own, problem.space.sample(self.sample, rng)])
+        log.add(own, problem.losses(own))
+        if self.starts == 1:
+            return own[:1]
+        cube = problem.space.sample(self.sample, rng)
         losses = problem.losses(cube)
         log.add(cube, losses)
-        return cube[np.argsort(losses, kind="stable")[: self.starts]]
+        best = cube[np.argsort(losses, kind="stable")[: self.starts - 1]]
+        return np.concatenate([own[:1], best])
 
-    def _search(self, problem: ResidualProblem, start: np.ndarray, secant: float, log: Log) -> np.ndarray:
-        neutral = problem.space.neutral
+    def _follow(self, problem: ResidualProblem, start: np.ndarray, log: Log) -> None:
+        """Follow the minimum from wide smoothing to none."""
+        for level in self.smoothing:
+            start = self._search(problem.smoothed(level), start, log)
+            log.add(start[None], problem.losses(start[None]))
+
+    def _search(self, problem: ResidualProblem, start: np.ndarray, log: Log) -> np.ndarray:
+        # The start is about as far from the neutral value as the effect is large.
+        reach = np.abs(problem.space.start - problem.space.neutral)
 
         def residuals(cube: np.ndarray) -> np.ndarray:
-            values = problem.residuals(cube)
-            log.add(cube[None], np.array([np.mean(values**2)]))
-            return values
+            log.tick(1)
+            return problem.residuals(cube)
 
         def jacobian(cube: np.ndarray) -> np.ndarray:
-            log.count += 2 * len(cube)
-            return problem.jacobian(cube, secant * np.abs(cube - neutral))
+            log.tick(2 * len(cube))
+            return problem.jacobian(cube, SECANT * np.maximum(np.abs(cube - problem.space.neutral), reach))
 
         result = optimize.least_squares(
             residuals,

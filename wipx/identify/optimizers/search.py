@@ -79,12 +79,20 @@ class Log:
         Raises:
             BudgetSpent: the budget of evaluations or seconds is used up.
         """
-        self.count += len(losses)
         self.failed += int(np.sum(~np.isfinite(losses)))
         finite = np.where(np.isfinite(losses), losses, np.inf)
         i = int(np.argmin(finite))
-        if finite[i] < self.best_loss:
+        if finite[i] < self.best_loss or self.best is None:
             self.best_loss, self.best = float(finite[i]), np.array(cube[i])
+        self.tick(len(losses))
+
+    def tick(self, evaluations: int) -> None:
+        """Count evaluations whose losses do not compare with the others.
+
+        Raises:
+            BudgetSpent: as `add`.
+        """
+        self.count += evaluations
         spent = time.monotonic() - self.began
         self.course.append((self.count, spent, self.best_loss))
         self.watcher(self.count, spent, self.best_loss)

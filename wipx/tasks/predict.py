@@ -1,0 +1,65 @@
+"""`task=predict`: predictions of recordings by a model, exactly as contract section 4 has them."""
+
+from dataclasses import dataclass
+from pathlib import PurePath
+
+import numpy as np
+
+from wipx.core.errors import InputError
+from wipx.core.model import Model
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.recordings.model_file import read_model
+from wipx.recordings.source import RecordingSource
+from wipx.tasks.job import Job
+from wipx.tasks.results import write_csv, write_json, written_together
+
+HORIZON = 0.5  # [s], contract section 4
+
+
+@dataclass(frozen=True)
+class Predict:
+    """Predict every recording, restarted every 0.5 s.
+
+    Attributes:
+        lead: Time before a restart from which the state is estimated [s].
+    """
+
+    lead: float = 0.3
+
+    def run(self, job: Job) -> None:
+        """Write metrics.json and one csv of predicted columns for each recording."""
+        source: RecordingSource = job.part("recordings")
+        nominal: Model = job.part("plant").nominal(source.describe().model)
+        model = read_model(job.model_path) if job.model_path else nominal
+        if model.plant != nominal.plant:
+            raise InputError(
+                f"{job.model_path}: a model of plant {model.plant.kind}, expected {nominal.plant.kind} as in {source.name}"
+            )
+        recordings = source.load()
+        judge = Judge(job.part("sim"), sensor_noise(recordings, model.plant), HORIZON, self.lead)
+        errors, traces = judge.compare(nominal, model, recordings, held_out=True)
+        columns = model.plant.coordinates
+        with written_together(job.out) as folder:
+            for trace in traces:
+                table = {"t": trace.t, **{name: trace.completed[name] for name in columns}}
+                write_csv(folder / PurePath(trace.name).with_suffix(".csv").name, table)
+            write_json(
+                folder / "metrics.json",
+                {
+                    "schema": 1,
+                    "model": str(job.model_path) if job.model_path else "nominal",
+                    "horizon_s": HORIZON,
+                    "windows": errors.windows,
+                    "rms": errors.completed,
+                    "rms_nominal": errors.nominal,
+                    "noise_floor": errors.noise_floor,
+                    "recordings": {t.name: {n: _rms(t.completed[n] - t.recorded[n]) for n in columns} for t in traces},
+                },
+            )
+        figures = ", ".join(f"{n} {errors.completed[n]:.4g} {model.plant.unit_of(n)}" for n in columns)
+        print(f"rms error of {errors.windows} predictions over {HORIZON:g} s: {figures}; written to {job.out}")
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else float("nan")
