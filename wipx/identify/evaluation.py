@@ -50,7 +50,7 @@ class Judge:
             windows.count,
             dict(zip(names, _rms(windows, before.coordinates[:, :, 0] - windows.recorded), strict=True)),
             dict(zip(names, _rms(windows, after.coordinates[:, :, 0] - windows.recorded), strict=True)),
-            dict(zip(names, _rms(windows, after.floor[:, :, 0]), strict=True)),
+            dict(zip(names, _typical(windows, after.floor[:, :, 0]), strict=True)),
         )
         predicted = [
             _by_recording(windows, prediction.coordinates[:, :, 0], recordings) for prediction in (before, after)
@@ -93,6 +93,16 @@ def _rms(windows: Windows, errors: np.ndarray) -> list[float]:
     """Root mean square over the predicted rows, of each joint."""
     counted = np.moveaxis(errors, 1, 0)[:, windows.predicted]
     return np.sqrt(np.mean(counted**2, axis=1)).tolist()
+
+
+def _typical(windows: Windows, deviations: np.ndarray) -> list[float]:
+    """Root mean square of the median window, of each joint.
+
+    The median, because a joint on the verge of sticking has no linear answer to noise.
+    """
+    squares = np.where(windows.predicted[:, None, :], deviations**2, 0.0)
+    means = squares.sum(axis=0) / windows.predicted.sum(axis=0)
+    return np.sqrt(np.median(means, axis=1)).tolist()
 
 
 def _by_recording(windows: Windows, predicted: np.ndarray, recordings: tuple[Recording, ...]) -> list[np.ndarray]:

@@ -139,7 +139,7 @@ def _weigh_evenly(problem, minimum: Minimum, optimizer: Optimizer, rng: np.rando
         return problem, minimum
     start = problem.space.to_values(minimum.cube)
     free = tuple(replace(p, start=float(v)) for p, v in zip(problem.space.free, start, strict=True))
-    weighed = replace(weighed, space=replace(problem.space, free=free))
+    weighed = replace(weighed, space=replace(problem.space, free=free), _last=[])
     again = optimizer.minimise(weighed, rng, watcher)
     return weighed, replace(again, history=_joined(minimum.history, again.history))
 

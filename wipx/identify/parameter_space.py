@@ -14,7 +14,7 @@ from wipx.core.recording import Recording
 from wipx.effects.catalogue import effect_of
 
 LOGARITHMIC = 50.0  # bounds further apart than this factor are searched on a logarithmic scale
-FREE_RANGE = 8.0  # a freed plant parameter may lie within this factor of its nominal value
+FREE_RANGE = 30.0  # a freed plant parameter may lie within this factor of its nominal value
 DECADES = 3.5  # of distance from the neutral value that random starts cover
 PRIOR_RANGE = 4.0  # standard deviations of a prior that the search covers
 
@@ -149,19 +149,21 @@ def _effect_parameters(name: str, plant: Plant, scales: Mapping[str, Scales]):
 
 def _nominal_parameter(name: str, model: Model, deviation: float | None) -> FreeParameter:
     value = model.value(name)
+    size = abs(value)
     effect, _, symbol = name.rpartition(".")
     if effect:
         spec = next(p for p in effect_of(effect, model.plant).parameters if p.name == symbol)
         unit = spec.unit(angular=model.plant.is_angular(effect.partition("/")[0]))
+        lowest = 0.0 if spec.low >= 0.0 else -np.inf
     else:
         unit = model.plant.parameters[symbol].unit
-    size = abs(value)
+        lowest = value / FREE_RANGE if value > 0.0 else -np.inf
     if deviation is not None:
         reach = PRIOR_RANGE * deviation * size
-        low = max(value - reach, value / FREE_RANGE) if value > 0.0 else value - reach
+        low = max(value - reach, lowest)
         return FreeParameter(name, unit, low, value + reach, value, value, value, deviation * size)
     if value == 0.0:
-        raise InputError(f"free: {name} is 0, which says nothing of its size; give bounds.{name}=[low, high]")
+        raise InputError(f"free: {name} is 0, which says nothing of its size; give bounds={{{name}: [low, high]}}")
     ends = sorted((value / FREE_RANGE, value * FREE_RANGE))
     return FreeParameter(name, unit, ends[0], ends[1], value, value)
 

@@ -83,15 +83,17 @@ class Predictor:
                 true[[j, joints + j]] /= 1.0 + batch.column(f"{scale}.e")[:, None]
         return true
 
-    def predict(self, batch: ModelBatch, *, floor: bool = False) -> Prediction:
+    def predict(self, batch: ModelBatch, near: np.ndarray | None = None, *, floor: bool = False) -> Prediction:
         """Estimate the states of all windows and predict them.
 
         Args:
             batch: P models.
+            near: States of a similar model, from which the estimate starts, shape (2 joints, P, R);
+                without them it starts from a parabola and sees more of each window by and by.
             floor: Whether to propagate the sensor noise too.
         """
-        state = self.first_guess(batch)
-        for reach in self._reaches():
+        state = self.first_guess(batch) if near is None else near
+        for reach in self._reaches() if near is None else ():
             residuals, gain = self.state_gain(batch, state, reach)
             state = state + self.correction(gain, residuals)
         state, gain = self._settle(batch, state)
@@ -109,8 +111,8 @@ class Predictor:
         n = len(coordinates)
         scaled = self.windows.recorded[:n, :, None, :] - coordinates
         scaled /= self.noise[None, :, None, None]
-        np.nan_to_num(scaled, copy=False, nan=DIVERGED, posinf=DIVERGED, neginf=-DIVERGED)
-        np.clip(scaled, -DIVERGED, DIVERGED, out=scaled)
+        np.fmin(scaled, DIVERGED, out=scaled)  # also where it is not a number
+        np.fmax(scaled, -DIVERGED, out=scaled)
         scaled *= rows[:n, None, None, :]
         return scaled
 
@@ -235,11 +237,11 @@ class StateGain:
     def normal(self) -> np.ndarray:
         """Normal matrix, shape (P, R, 2 joints, 2 joints).
 
-        A joint that sticks tells nothing of its rate; a weak prior of ten thousand steps
+        A joint that sticks tells nothing of its rate; a weak prior of a hundred steps
         keeps the matrix regular.
         """
         product = np.einsum("akjpr,bkjpr->prab", self.slopes, self.slopes, optimize=True)
-        return product + np.diag((1e-4 / self.steps) ** 2)
+        return product + np.diag((1e-2 / self.steps) ** 2)
 
 
 def _last_row(rows: np.ndarray) -> np.ndarray:

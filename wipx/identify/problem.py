@@ -1,6 +1,6 @@
 """What an optimizer minimises: prediction errors of windows, as a function of the unit cube."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -55,12 +55,13 @@ class WindowProblem:
     space: ParameterSpace
     predictor: Predictor
     speeds: tuple[float, ...]
+    _last: list[tuple[np.ndarray, Prediction]] = field(default_factory=list, compare=False, repr=False)
 
     def smoothed(self, level: float) -> "WindowProblem":
         """The same problem with dry friction that builds up over a share `level` of the joints' speeds."""
         smoothing = tuple(level * speed for speed in self.speeds)
         simulator = replace(self.predictor.simulator, smoothing=smoothing)
-        return replace(self, predictor=replace(self.predictor, simulator=simulator))
+        return replace(self, predictor=replace(self.predictor, simulator=simulator), _last=[])
 
     def losses(self, cube: np.ndarray) -> np.ndarray:
         """Mean squared residual and priors of every candidate, shape (P,)."""
@@ -70,7 +71,18 @@ class WindowProblem:
 
     def residuals(self, cube: np.ndarray) -> np.ndarray:
         """Residuals of the predicted rows, then of the priors, shape (N,)."""
-        return next(self._residuals_of(np.atleast_2d(cube)))
+        prediction = self._prediction_near(cube)
+        flat = self._flat(self.predictor.residuals(prediction.coordinates, self.predictor.windows.predicted))
+        return np.concatenate([flat[0], self.space.prior_residuals(cube)[0]])
+
+    def _prediction_near(self, cube: np.ndarray) -> Prediction:
+        """The prediction at a position (D,), its states estimated from those of the position before."""
+        if self._last and np.array_equal(self._last[0][0], cube):
+            return self._last[0][1]
+        near = self._last[0][1].initial if self._last else None
+        prediction = self.predictor.predict(self.space.batch(cube), near)
+        self._last[:] = [(cube.copy(), prediction)]
+        return prediction
 
     def jacobian(self, cube: np.ndarray, size: np.ndarray | float = 0.0) -> np.ndarray:
         """Slopes of `residuals` by central differences, shape (N, D); the state follows the parameters.
@@ -84,7 +96,7 @@ class WindowProblem:
         above, below = np.minimum(cube + reach, 1.0), np.maximum(cube - reach, 0.0)
         moved = np.concatenate([_replaced(cube, above), _replaced(cube, below)])
         base = self.space.batch(cube)
-        prediction = self.predictor.predict(base)
+        prediction = self._prediction_near(cube)
         known, gain = self.predictor.state_gain(base, prediction.initial)
         rows = []
         for part in _chunks(len(moved), self._chunk()):
@@ -118,7 +130,9 @@ class WindowProblem:
         joints = self.predictor.windows.recorded.shape[1]
         joint_of = np.broadcast_to(np.arange(joints)[:, None], self._mask().shape)[self._mask()]
         rms = np.array([np.sqrt(np.mean(residuals[joint_of == j] ** 2)) for j in range(joints)])
-        return replace(self, predictor=replace(self.predictor, noise=self.predictor.noise * np.maximum(rms, 1e-3)))
+        return replace(
+            self, predictor=replace(self.predictor, noise=self.predictor.noise * np.maximum(rms, 1e-3)), _last=[]
+        )
 
     def _rows(self) -> int:
         return int(self._mask().sum())
