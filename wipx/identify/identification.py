@@ -105,8 +105,11 @@ def identify(
     speeds = tuple(scales[site].velocity for site in nominal.plant.joints)
     data = FitData(split.fit, nominal, simulator, noise, speeds, request.feedback)
     problem = objective.problem(data, space)
+    if isinstance(problem, WindowProblem):
+        problem = problem.tempered(space.neutral)
     minimum = optimizer.minimise(problem, rng, watcher)
-    problem, minimum = _weigh_evenly(problem, minimum, optimizer, rng, watcher)
+    if isinstance(problem, WindowProblem):
+        problem, minimum = _weighed_anew(problem, minimum, optimizer, rng, watcher)
     values = problem.space.to_values(minimum.cube)
     completed = space.model.with_values(dict(zip(space.names, values.tolist(), strict=True)))
     judge = Judge(simulator, noise, horizon, lead)
@@ -125,21 +128,23 @@ def identify(
     )
 
 
-def _weigh_evenly(problem, minimum: Minimum, optimizer: Optimizer, rng: np.random.Generator, watcher: Watcher):
-    """Search once more, each signal weighed by the error it was left with.
+def _weighed_anew(
+    problem: WindowProblem, minimum: Minimum, optimizer: Optimizer, rng: np.random.Generator, watcher: Watcher
+) -> tuple[WindowProblem, Minimum]:
+    """Search once more, signals and windows weighed by the errors they were left with.
 
-    Weights from the sensor noise are right for a perfect model only; where one signal fits far
-    worse than its noise it would drown the other.
+    Weights from the sensor noise are right for a perfect model only; where one signal or one
+    window fits far worse than its noise it would drown the others.
     """
-    if not isinstance(problem, WindowProblem):
-        return problem, minimum
-    weighed = problem.reweighted(minimum.cube)
-    ratio = weighed.predictor.noise / problem.predictor.noise
-    if ratio.max() / ratio.min() < UNEVEN:
+    weighed = problem.reweighted(minimum.cube).tempered(minimum.cube)
+    signals = weighed.predictor.noise / problem.predictor.noise
+    before, after = problem.weights, weighed.weights
+    windows_alike = before is not None and after is not None and np.allclose(before, after, atol=0.2)
+    if signals.max() / signals.min() < UNEVEN and windows_alike:
         return problem, minimum
     start = problem.space.to_values(minimum.cube)
     free = tuple(replace(p, start=float(v)) for p, v in zip(problem.space.free, start, strict=True))
-    weighed = replace(weighed, space=replace(problem.space, free=free), _last=[])
+    weighed = replace(weighed, space=replace(problem.space, free=free))
     again = optimizer.minimise(weighed, rng, watcher)
     return weighed, replace(again, history=_joined(minimum.history, again.history))
 

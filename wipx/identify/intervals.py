@@ -36,9 +36,9 @@ def _sandwich(jacobian: np.ndarray, residuals: np.ndarray, groups: list[np.ndarr
 
 
 def intervals(problem: WindowProblem, cube: np.ndarray) -> np.ndarray:
-    """Lower and upper ends of the 95 % intervals, shape (D, 2) [SI]."""
+    """Lower and upper ends of the 95 % intervals within the search intervals, shape (D, 2) [SI]."""
     matrix, clusters = covariance(problem, cube)
     deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     reach = stats.t.ppf(0.975, max(clusters - len(cube), 1)) * deviation
-    ends = np.stack([problem.space.to_values(cube - reach), problem.space.to_values(cube + reach)], axis=1)
-    return np.sort(ends, axis=1)
+    low, high = np.maximum(cube - reach, 0.0), np.minimum(cube + reach, 1.0)
+    return np.stack([problem.space.to_values(low), problem.space.to_values(high)], axis=1)

@@ -22,7 +22,7 @@ STEPS = 6  # Levenberg-Marquardt steps on all known rows, at most
 SETTLED = 1e-3  # relative fall of the squared residuals below which a window is through
 GUESS_SPAN = 0.08  # [s] of rows through which the first parabola goes
 FEWEST_ROWS = 4  # that a step sees in any case
-DIVERGED = 1e4  # in standard deviations; what a prediction that fell over counts
+DIVERGED = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,12 @@ class Predictor:
     simulator: AnalyticSimulator
     windows: Windows
     noise: np.ndarray
+
+    @cached_property
+    def _largest(self) -> np.ndarray:
+        """Largest error that is counted, shape (joints,) [m or rad]."""
+        rows = np.moveaxis(self.windows.recorded, 1, 0)[:, self.windows.known | self.windows.predicted]
+        return DIVERGED * np.ptp(rows, axis=1) + 1e3 * self.noise
 
     @cached_property
     def _parabola(self) -> np.ndarray:
@@ -110,9 +116,10 @@ class Predictor:
         """
         n = len(coordinates)
         scaled = self.windows.recorded[:n, :, None, :] - coordinates
-        scaled /= self.noise[None, :, None, None]
-        np.fmin(scaled, DIVERGED, out=scaled)  # also where it is not a number
-        np.fmax(scaled, -DIVERGED, out=scaled)
+        largest = self._largest[:, None, None]
+        np.fmin(scaled, largest, out=scaled)  # also where it is not a number
+        np.fmax(scaled, -largest, out=scaled)
+        scaled /= self.noise[:, None, None]
         scaled *= rows[:n, None, None, :]
         return scaled
 

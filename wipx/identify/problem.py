@@ -10,6 +10,7 @@ from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.prediction import Prediction, Predictor
 
 SLOPE_STEP = 1e-4  # of the search interval
+TOLERATED = 5.0  # times the median window's error; beyond it a window counts less
 LARGEST_CALL = 4_000_000  # numbers of one batch of rollouts, about 32 MB
 
 
@@ -50,11 +51,13 @@ class WindowProblem:
         space: The numbers that vary.
         predictor: Windows and how to predict them; its `noise` weighs the signals.
         speeds: What each joint reaches, shape (joints,) [m/s or rad/s]; measures the smoothing.
+        weights: How much each window counts, shape (R,); None for all alike.
     """
 
     space: ParameterSpace
     predictor: Predictor
     speeds: tuple[float, ...]
+    weights: np.ndarray | None = None
     _last: list[tuple[np.ndarray, Prediction]] = field(default_factory=list, compare=False, repr=False)
 
     def smoothed(self, level: float) -> "WindowProblem":
@@ -126,13 +129,27 @@ class WindowProblem:
 
     def reweighted(self, cube: np.ndarray) -> "WindowProblem":
         """The same problem, each signal weighed by the error that it has at a position (D,)."""
-        residuals = self.residuals(cube)[: int(self._mask().sum())]
+        plain = replace(self, weights=None, _last=[])
+        residuals = plain.residuals(cube)[: self._rows()]
         joints = self.predictor.windows.recorded.shape[1]
         joint_of = np.broadcast_to(np.arange(joints)[:, None], self._mask().shape)[self._mask()]
-        rms = np.array([np.sqrt(np.mean(residuals[joint_of == j] ** 2)) for j in range(joints)])
-        return replace(
-            self, predictor=replace(self.predictor, noise=self.predictor.noise * np.maximum(rms, 1e-3)), _last=[]
-        )
+        # The median, since a few windows may have fallen over.
+        sizes = np.array([np.median(np.abs(residuals[joint_of == j])) / 0.6745 for j in range(joints)])
+        noise = self.predictor.noise * np.maximum(sizes, 1e-3)
+        return replace(self, predictor=replace(self.predictor, noise=noise), _last=[])
+
+    def tempered(self, cube: np.ndarray) -> "WindowProblem":
+        """The same problem, in which windows that are far off at a position (D,) count less (Huber 1964).
+
+        An unstable plant that is left alone falls to one side or the other; one such window
+        would outweigh all others.
+        """
+        plain = replace(self, weights=None, _last=[])
+        residuals = plain.residuals(cube)
+        groups = plain.by_window(residuals)[: self.predictor.windows.count]
+        sizes = np.array([np.sqrt(np.mean(residuals[g] ** 2)) for g in groups])
+        limit = TOLERATED * max(float(np.median(sizes)), 1.0)
+        return replace(self, weights=np.minimum(1.0, limit / np.maximum(sizes, 1e-300)), _last=[])
 
     def _rows(self) -> int:
         return int(self._mask().sum())
@@ -144,7 +161,8 @@ class WindowProblem:
 
     def _flat(self, residuals: np.ndarray) -> np.ndarray:
         """From (K + 1, joints, P, R) to (P, N)."""
-        return np.moveaxis(residuals, 2, 0)[:, self._mask()]
+        weighed = residuals if self.weights is None else residuals * self.weights
+        return np.moveaxis(weighed, 2, 0)[:, self._mask()]
 
     def _chunk(self) -> int:
         windows = self.predictor.windows
