@@ -106,6 +106,7 @@ def run_task(config: DictConfig, out: Path) -> None:
         bounds=_intervals(settings["bounds"]),
         model_path=None if model_path is None else Path(model_path),
         part=part,
+        build=build,
         settings=settings,
     )
     part("task").run(job)

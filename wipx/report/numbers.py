@@ -94,7 +94,10 @@ def with_interval(value: float, low: float, high: float) -> Interval:
     decimals = MOST_DIGITS - 1 - exponent
     if high > low:
         decimals = min(decimals, 1 - _exponent(high - low, 2))
-    return Interval(*(_fixed(number, decimals, exponent) for number in (value, low, high)))
+    shown = [_fixed(number, decimals, exponent) for number in (value, low, high)]
+    if value != 0.0 and abs(value) < 10.0**-decimals:
+        shown[0] = significant(value, 2)  # an interval far wider than the value must not hide it
+    return Interval(*shown)
 
 
 def _exponent(value: float, digits: int) -> int:

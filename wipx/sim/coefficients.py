@@ -14,7 +14,7 @@ from wipx.effects.lagged_stribeck import lag_of
 from wipx.effects.payload import loaded
 from wipx.sim import rows as R
 
-FASTEST_LAG = 1e-9  # [s]; a lag of zero is one that settles at once
+FASTEST_LAG = 1e-12  # [s]; a lag of zero is one that settles at once
 
 
 @dataclass(frozen=True)
@@ -229,6 +229,9 @@ def _joint(f: _Filler, site: str, j: int) -> None:
     )
     if f.present[R.ON_BRISTLE + j]:
         f.present[R.ON_DAMPING] = True
+        # A bristle without a level slides at once; from rest it would first be a spring.
+        held = np.maximum(f.rows[R.SLIDING + j], f.rows[R.PEAK + j]) > 0.0
+        f.rows[[R.BRISTLE + j, R.BRISTLE_DAMPING + j]] *= held
     paper = f.values(f"{site}/lagged_stribeck")
     if paper is not None:
         f.present[R.ON_PAPER + j] = True

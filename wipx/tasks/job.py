@@ -20,6 +20,7 @@ class Job:
         model_path: A model.yaml to start from; None for the nominal model.
         part: Gives the chosen part of a group, e.g. `part("optimizer")`. It is built when it is
             first asked for, so that a part that is never used costs nothing.
+        build: Builds a part from a mapping with `_target_`; takes its name for messages too.
         settings: The whole configuration in plain containers, for logging.
     """
 
@@ -30,4 +31,5 @@ class Job:
     bounds: Mapping[str, tuple[float, float]]
     model_path: Path | None
     part: Callable[[str], Any]
+    build: Callable[[object, str], Any]
     settings: Mapping[str, Any]

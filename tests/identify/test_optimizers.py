@@ -1,0 +1,162 @@
+"""What every optimizer of conf/optimizer promises."""
+
+import logging
+import os
+import pickle
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from emulated_robot import nominal_model
+
+from wipx.app import configuration_folder
+from wipx.config import build
+from wipx.core.parameters import FreeParameter
+from wipx.identify.optimizers.least_squares import LeastSquares
+from wipx.identify.optimizers.pso import ParticleSwarm
+from wipx.identify.parameter_space import ParameterSpace
+
+OPTIONS = sorted(path.stem for path in (configuration_folder() / "optimizer").glob("*.yaml"))
+BEST = np.array([0.7, 0.2, 0.45])
+
+
+@dataclass(frozen=True)
+class CurvedValley:
+    """Residuals with one minimum, at `BEST` with loss zero; some positions may have no loss."""
+
+    hole: float = 0.0
+    pause: float = 0.0
+    calls: list[int] = field(default_factory=list, compare=False)
+
+    @property
+    def space(self) -> ParameterSpace:
+        model = nominal_model("pendulum")
+        names = ("body_mass", "com_height", "body_inertia")
+        return ParameterSpace(model, tuple(FreeParameter(name, "1", 0.0, 1.0, 0.1, 0.05) for name in names))
+
+    def smoothed(self, level: float) -> "CurvedValley":
+        return self
+
+    def losses(self, cube: np.ndarray) -> np.ndarray:
+        self.calls.append(len(cube))
+        time.sleep(self.pause)
+        values = np.array([np.mean(self.residuals(row) ** 2) for row in cube])
+        return np.where(cube[:, 0] < self.hole, np.inf, values)
+
+    def residuals(self, cube: np.ndarray) -> np.ndarray:
+        d = cube - BEST
+        return np.array([d[0], 3.0 * d[1] + d[0] ** 2, 0.3 * d[2] + d[1], d[2] * d[0]])
+
+    def jacobian(self, cube: np.ndarray, size: np.ndarray | float = 0.0) -> np.ndarray:
+        steps = 1e-6 * np.eye(3)
+        return np.array([(self.residuals(cube + s) - self.residuals(cube - s)) / 2e-6 for s in steps]).T
+
+
+@pytest.fixture(params=OPTIONS)
+def optimizer(request: pytest.FixtureRequest) -> LeastSquares | ParticleSwarm:
+    path = configuration_folder() / "optimizer" / f"{request.param}.yaml"
+    return build(yaml.safe_load(path.read_text()), "optimizer")
+
+
+def test_the_minimum_is_found(optimizer):
+    minimum = optimizer.minimise(CurvedValley(), np.random.default_rng(1))
+    # A swarm with an inertia of 0.9 is still moving after 100 generations.
+    np.testing.assert_allclose(minimum.cube, BEST, atol=0.15)
+    assert minimum.loss == pytest.approx(np.mean(CurvedValley().residuals(minimum.cube) ** 2))
+    assert minimum.loss < 3e-3
+    assert minimum.failed == 0
+
+
+def test_the_same_seed_gives_the_same_result(optimizer):
+    first, second = (optimizer.minimise(CurvedValley(), np.random.default_rng(2)) for _ in range(2))
+    np.testing.assert_array_equal(first.cube, second.cube)
+    np.testing.assert_array_equal(first.history.best_loss, second.history.best_loss)
+
+
+def test_the_best_loss_never_rises_and_effort_never_falls(optimizer, fresh_seed: int):
+    history = optimizer.minimise(CurvedValley(), np.random.default_rng(fresh_seed)).history
+    assert np.all(np.diff(history.best_loss) <= 0.0)
+    assert np.all(np.diff(history.evaluations) >= 0)
+    assert np.all(np.diff(history.seconds) >= 0.0)
+    assert len(history.best_loss) == len(history.evaluations) == len(history.seconds)
+
+
+@pytest.mark.parametrize("budget", [1, 60, 120])
+def test_the_budget_of_evaluations_ends_the_search(optimizer, budget: int):
+    problem = CurvedValley()
+    minimum = replace(optimizer, evaluations=budget).minimise(problem, np.random.default_rng(3))
+    assert minimum.history.stopped in (f"budget of {budget} evaluations", "converged")
+    assert minimum.history.evaluations[-1] < budget + 50  # one batch may be under way
+    assert np.isfinite(minimum.loss)
+
+
+def test_the_budget_of_time_ends_the_search(optimizer):
+    began = time.monotonic()
+    minimum = replace(optimizer, seconds=0.05).minimise(CurvedValley(pause=0.03), np.random.default_rng(4))
+    assert minimum.history.stopped == "budget of 0.05 s"
+    assert time.monotonic() - began < 5.0  # the first import of the swarm library takes its time
+
+
+def test_a_watcher_sees_the_progress_and_can_cancel(optimizer):
+    seen: list[tuple[int, float]] = []
+
+    def cancel_late(evaluations: int, seconds: float, best_loss: float) -> None:
+        seen.append((evaluations, best_loss))
+        if len(seen) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        optimizer.minimise(CurvedValley(), np.random.default_rng(5), cancel_late)
+    assert len(seen) == 3
+    assert seen[0][0] < seen[2][0]
+
+
+def test_candidates_that_fell_over_are_counted_and_never_chosen(optimizer):
+    minimum = optimizer.minimise(CurvedValley(hole=0.06), np.random.default_rng(6))
+    assert minimum.cube[0] >= 0.06
+    assert minimum.failed > 0
+    assert np.isfinite(minimum.loss)
+
+
+def test_global_state_is_left_alone(optimizer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    np.random.seed(7)
+    before, environment, level = np.random.get_state()[1].tolist(), dict(os.environ), logging.getLogger().level
+    optimizer.minimise(CurvedValley(), np.random.default_rng(7))
+    assert np.random.get_state()[1].tolist() == before
+    assert logging.getLogger().level == level
+    assert dict(os.environ) == environment
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_global_state_is_left_alone_by_a_search_that_is_cancelled(optimizer):
+    def cancel(evaluations: int, seconds: float, best_loss: float) -> None:
+        raise KeyboardInterrupt
+
+    np.random.seed(8)
+    before = np.random.get_state()[1].tolist()
+    with pytest.raises(KeyboardInterrupt):
+        optimizer.minimise(CurvedValley(), np.random.default_rng(8), cancel)
+    assert np.random.get_state()[1].tolist() == before
+    assert "LOG_CFG" not in os.environ
+
+
+def test_it_pickles(optimizer):
+    assert pickle.loads(pickle.dumps(optimizer)) == optimizer
+
+
+def test_a_swarm_evaluates_every_particle_in_every_generation():
+    problem = CurvedValley()
+    minimum = ParticleSwarm(particles=8, iterations=5).minimise(problem, np.random.default_rng(9))
+    assert problem.calls == [8] * 5
+    assert minimum.history.stopped == "5 generations"
+
+
+def test_least_squares_tries_as_many_starts_as_it_is_told():
+    one = LeastSquares(starts=1, smoothing=(0.0,)).minimise(CurvedValley(), np.random.default_rng(10))
+    four = LeastSquares(starts=4, smoothing=(0.0,)).minimise(CurvedValley(), np.random.default_rng(10))
+    assert four.loss <= one.loss
+    assert four.history.evaluations[-1] > 2 * one.history.evaluations[-1]
