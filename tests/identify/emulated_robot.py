@@ -105,6 +105,7 @@ class Robot:
                     "t": t,
                     **{column: shown[:, j, r] for j, column in enumerate(plant.coordinates)},
                     **{column: run.commands[:, c, 0, r] for c, column in enumerate(plant.commands)},
+                    **{f"{c}_ref": references[:, i, r] for i, c in enumerate((*plant.coordinates, *plant.rates))},
                 },
             )
             for r in range(count)

@@ -28,7 +28,7 @@ AT_JOINTS = [
 FRICTION_AT_JOINTS = [(kind, name) for kind, name in AT_JOINTS if name.partition("/")[2] not in STORING]
 # A bristle gives back what it has stored: at most F_s^2 / (2 stiffness).
 SPRING_BACK = {"presliding": 0.2**2 / 4000.0, "lugre": 0.3**2 / 4000.0}
-TWO_SECONDS = np.linspace(0.0, 2.0, 401)
+TWO_SECONDS = np.linspace(0.0, 2.0, 501)  # rows of 4 ms: whole numbers of steps of 1 and 2 ms
 
 
 @pytest.mark.parametrize("kind", PARAMETERS)

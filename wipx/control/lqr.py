@@ -41,7 +41,9 @@ class Lqr:
 
         joints = len(model.plant.joints)
         if min(len(self.coordinates), len(self.rates)) < joints:
-            raise InputError(f"controller: weights for {joints} joints are needed, got {self.coordinates} and {self.rates}")
+            raise InputError(
+                f"controller: weights for {joints} joints are needed, got {self.coordinates} and {self.rates}"
+            )
         linear = linearise(model)
         weights = np.diag([*self.coordinates[:joints], *self.rates[:joints]])
         try:

@@ -9,7 +9,9 @@ import numpy as np
 
 # NaN and infinity stay meaningful: a rollout that fell over must be recognisable.
 law = numba.njit(fastmath={"nsz", "arcp", "contract", "afn", "reassoc"}, error_model="numpy", nogil=True)
-inlined = numba.njit(fastmath={"nsz", "arcp", "contract", "afn", "reassoc"}, inline="always")  # keeps constants constant
+inlined = numba.njit(
+    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"}, inline="always"
+)  # keeps constants constant
 
 
 @law
@@ -43,10 +45,14 @@ def decay(y):
     Taylor polynomial of exp(-y / 256), squared eight times.
     """
     z = minimum(y, 40.0) * (-1.0 / 256.0)
-    p = 1.0 + z * (
-        1.0
-        + z * (1 / 2 + z * (1 / 6 + z * (1 / 24 + z * (1 / 120 + z * (1 / 720 + z * (1 / 5040 + z * (1 / 40320 + z / 362880)))))))
-    )
+    p = 1 / 40320 + z / 362880
+    p = 1 / 5040 + z * p
+    p = 1 / 720 + z * p
+    p = 1 / 120 + z * p
+    p = 1 / 24 + z * p
+    p = 1 / 6 + z * p
+    p = 1 / 2 + z * p
+    p = 1.0 + z * (1.0 + z * p)
     p = p * p
     p = p * p
     p = p * p
@@ -80,16 +86,18 @@ def sin_cos(angle):
     k = turns(angle)
     half = 0.5 * ((angle - k * 6.283185307179586) - k * 2.4492935982947064e-16)
     z = half * half
-    s = half * (
-        1.0
-        - z
-        * (1 / 6 - z * (1 / 120 - z * (1 / 5040 - z * (1 / 362880 - z * (1 / 39916800 - z * (1 / 6227020800 - z / 1307674368000))))))
-    )
-    # 1 - cos = z/2 - ...
-    d = z * (
-        1 / 2
-        - z
-        * (1 / 24 - z * (1 / 720 - z * (1 / 40320 - z * (1 / 3628800 - z * (1 / 479001600 - z * (1 / 87178291200 - z / 20922789888000))))))
-    )
-    c = 1.0 - d
-    return 2.0 * s * c, 1.0 - 2.0 * s * s
+    p = 1 / 6227020800 - z / 1307674368000
+    p = 1 / 39916800 - z * p
+    p = 1 / 362880 - z * p
+    p = 1 / 5040 - z * p
+    p = 1 / 120 - z * p
+    p = 1 / 6 - z * p
+    sine = half * (1.0 - z * p)
+    p = 1 / 87178291200 - z / 20922789888000
+    p = 1 / 479001600 - z * p
+    p = 1 / 3628800 - z * p
+    p = 1 / 40320 - z * p
+    p = 1 / 720 - z * p
+    p = 1 / 24 - z * p
+    cosine = 1.0 - z * (1 / 2 - z * p)
+    return 2.0 * sine * cosine, 1.0 - 2.0 * sine * sine

@@ -108,13 +108,13 @@ class Plant:
             raise InputError(f"{where}: {name} is {value!r}, expected a number in {spec.unit} ({spec.meaning})")
         bad = (spec.sign == "positive" and value <= 0.0) or (spec.sign == "non-negative" and value < 0.0)
         if bad or not abs(value) < float("inf"):
-            raise InputError(f"{where}: {name} = {value:g}, expected a {spec.sign} number in {spec.unit} ({spec.meaning})")
+            raise InputError(
+                f"{where}: {name} = {value:g}, expected a {spec.sign} number in {spec.unit} ({spec.meaning})"
+            )
         return float(value)
 
 
-RATE_OF = MappingProxyType(
-    {"x": "x_dot", "theta": "theta_dot", "theta1": "theta1_dot", "theta2": "theta2_dot"}
-)
+RATE_OF = MappingProxyType({"x": "x_dot", "theta": "theta_dot", "theta1": "theta1_dot", "theta2": "theta2_dot"})
 COLUMN_UNITS = MappingProxyType(
     {
         "t": "s",

@@ -34,7 +34,9 @@ class Recording:
             frozen[name] = array
         lengths = {len(array) for array in frozen.values()}
         if "t" not in frozen or len(lengths) != 1:
-            raise ValueError(f"{self.name}: columns must share one length and hold t, got {sorted(frozen)} of {lengths}")
+            raise ValueError(
+                f"{self.name}: columns must share one length and hold t, got {sorted(frozen)} of {lengths}"
+            )
         object.__setattr__(self, "columns", MappingProxyType(frozen))
 
     def __reduce__(self):

@@ -8,7 +8,9 @@ EFFECT = Effect(
     sites=("actuator",),
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),
-        Parameter("n", "periods per radian of the wheel (or of the joint, where it turns)", "ratio", 1.0, 1.0, 60.0, 6.0),
+        Parameter(
+            "n", "periods per radian of the wheel (or of the joint, where it turns)", "ratio", 1.0, 1.0, 60.0, 6.0
+        ),
         Parameter("phase", "angle of the first crest", "angle", 0.0, -3.2, 3.2, 0.0),
     ),
     law="+ A cos(n x/r + phase)",

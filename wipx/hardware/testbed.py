@@ -96,9 +96,13 @@ class EmulatedTestbed:
             ModelBatch(hidden), inputs, initial, feedback, references, noise[:-1]
         )
         if not np.all(np.abs(run.coordinates[:, joints - 1]) < FALLEN):
-            raise InputError("target=emulated: the robot fell over under this controller; change the controller's weights")
+            raise InputError(
+                "target=emulated: the robot fell over under this controller; change the controller's weights"
+            )
         shown = run.coordinates + noise[:, :joints]
-        return TestbedRun(tuple(self._log(plant, inputs, shown, run.commands, r, names[r]) for r in range(windows)), hidden)
+        return TestbedRun(
+            tuple(self._log(plant, inputs, shown, run.commands, r, names[r]) for r in range(windows)), hidden
+        )
 
     def _log(self, plant, inputs: Inputs, shown: np.ndarray, commands: np.ndarray, r: int, name: str) -> Recording:
         """Every `log_every`-th row, with the mean of the commands until the next."""

@@ -77,12 +77,16 @@ class ClosedLoopProblem:
         plant = space.model.plant
         for r in recordings:
             if r.duration < times[-1]:
-                raise InputError(f"{r.source or r.name}: {r.duration:.3g} s long, expected {times[-1]:g} s; leave it out")
+                raise InputError(
+                    f"{r.source or r.name}: {r.duration:.3g} s long, expected {times[-1]:g} s; leave it out"
+                )
         inputs = Inputs.regular(float(times[-1]) + 1.0 / rate, rate, len(plant.commands), len(recordings))
         at = inputs.t[:-1, 0]
         names = [*plant.coordinates, *plant.rates]
         references = np.stack([[_reference(r, n, at) for n in names] for r in recordings], axis=-1).transpose(1, 0, 2)
-        recorded = np.stack([[np.interp(times, r.t - r.t[0], r[c]) for c in plant.coordinates] for r in recordings], axis=-1)
+        recorded = np.stack(
+            [[np.interp(times, r.t - r.t[0], r[c]) for c in plant.coordinates] for r in recordings], axis=-1
+        )
         labels = sorted(set(classes))
         weights = np.array([[float(c == label) for label in labels] for c in classes])
         weights /= weights.sum(axis=0)

@@ -43,7 +43,9 @@ class IdentifiedFriction:
             InputError: there is no earlier model.
         """
         if earlier is None:
-            raise InputError("friction=identified takes the friction of an earlier model; give model.path=.../model.yaml")
+            raise InputError(
+                "friction=identified takes the friction of an earlier model; give model.path=.../model.yaml"
+            )
         frictions = {kind for kind, effect in kinds().items() if set(effect.sites) & set(JOINT_SITES)}
         return {
             name: dict(values)

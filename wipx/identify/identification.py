@@ -98,9 +98,7 @@ def identify(
     check_together((*nominal.effects, *request.switched_on), nominal.plant)
     prepared = nominal.with_effects({n: effect_of(n, nominal.plant).neutral for n in request.switched_on})
     scales = scales_of(prepared, split.fit)
-    space = parameter_space(
-        prepared, request.switched_on, request.uncertainty, request.free, request.bounds, scales
-    )
+    space = parameter_space(prepared, request.switched_on, request.uncertainty, request.free, request.bounds, scales)
     noise = sensor_noise(split.fit, nominal.plant)
     speeds = tuple(scales[site].velocity for site in nominal.plant.joints)
     data = FitData(split.fit, nominal, simulator, noise, speeds, request.feedback)
@@ -177,7 +175,7 @@ def _estimates(space: ParameterSpace, cube: np.ndarray, ends: np.ndarray) -> tup
             float(values[i]),
             float(ends[i, 0]),
             float(ends[i, 1]),
-            bool(cube[i] < AT_BOUND and p.low != p.neutral or cube[i] > 1.0 - AT_BOUND),
+            bool((cube[i] < AT_BOUND and p.low != p.neutral) or cube[i] > 1.0 - AT_BOUND),
             _meaning(space.model, p.name),
         )
         for i, p in enumerate(space.free)

@@ -117,7 +117,9 @@ class PaperTrajectories:
             InputError: the controller is unknown or a recording is too short.
         """
         if data.feedback is None:
-            raise InputError("objective=paper closes the loop and needs the robot's controller: add `controller` to robot.yaml")
+            raise InputError(
+                "objective=paper closes the loop and needs the robot's controller: add `controller` to robot.yaml"
+            )
         return ClosedLoopProblem.of(
             data.recordings,
             space,

@@ -134,7 +134,9 @@ def parameter_space(
             raise unknown_name("free parameter", name, taken, "bounds")
     bounded = tuple(_bounded(p, bounds.get(p.name)) for p in parameters)
     if not bounded:
-        raise InputError("nothing to identify: switch on effects=[site/kind, ...] or a friction, or free=... a parameter")
+        raise InputError(
+            "nothing to identify: switch on effects=[site/kind, ...] or a friction, or free=... a parameter"
+        )
     start = {p.name: p.start for p in bounded}
     return ParameterSpace(model.with_values(start), bounded)
 

@@ -123,9 +123,7 @@ class Predictor:
         scaled *= rows[:n, None, None, :]
         return scaled
 
-    def state_gain(
-        self, batch: ModelBatch, state: np.ndarray, reach: float = np.inf
-    ) -> tuple[np.ndarray, "StateGain"]:
+    def state_gain(self, batch: ModelBatch, state: np.ndarray, reach: float = np.inf) -> tuple[np.ndarray, "StateGain"]:
         """Residuals of the known rows at a state, and their dependence on it.
 
         Args:
@@ -151,9 +149,7 @@ class Predictor:
         slopes = np.stack([(every[:, :, 1 + i] - residuals) / steps[i] for i in range(n)])
         return residuals, StateGain(slopes, steps)
 
-    def correction(
-        self, gain: "StateGain", residuals: np.ndarray, damping: np.ndarray | float = 0.0
-    ) -> np.ndarray:
+    def correction(self, gain: "StateGain", residuals: np.ndarray, damping: np.ndarray | float = 0.0) -> np.ndarray:
         """Change of the state that the residuals of the known rows ask for, shape (2 joints, P, R).
 
         Args:
@@ -260,4 +256,3 @@ def _unit(steps: np.ndarray, i: int) -> np.ndarray:
     step = np.zeros((len(steps), 1, 1))
     step[i] = steps[i]
     return step
-

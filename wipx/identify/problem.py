@@ -5,7 +5,6 @@ from typing import Protocol
 
 import numpy as np
 
-from wipx.core.model import ModelBatch
 from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.prediction import Prediction, Predictor
 
@@ -15,23 +14,19 @@ LARGEST_CALL = 4_000_000  # numbers of one batch of rollouts, about 32 MB
 
 
 class Problem(Protocol):
-    """A loss over the unit cube; least-squares problems also give residuals."""
+    """A loss over the unit cube, and the residuals whose squares it is made of."""
 
     @property
     def space(self) -> ParameterSpace:
         """The numbers that vary."""
         ...
 
-    def losses(self, cube: np.ndarray) -> np.ndarray:
-        """Losses (P,) at positions (P, D): mean squared residual, 1 = the noise; inf where all fell over."""
+    def smoothed(self, level: float) -> "Problem":
+        """The same problem with dry friction smoothed by `level`; 0 for the problem itself."""
         ...
 
-
-class ResidualProblem(Problem, Protocol):
-    """A problem that least-squares methods can use."""
-
-    def smoothed(self, level: float) -> "ResidualProblem":
-        """The same problem with dry friction smoothed by `level`; 0 for the problem itself."""
+    def losses(self, cube: np.ndarray) -> np.ndarray:
+        """Losses (P,) at positions (P, D): mean squared residual, 1 = the noise."""
         ...
 
     def residuals(self, cube: np.ndarray) -> np.ndarray:

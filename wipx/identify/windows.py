@@ -73,7 +73,9 @@ def cut(
     Raises:
         InputError: a recording is shorter than one window.
     """
-    pieces = [piece for i, recording in enumerate(recordings) for piece in _pieces(i, recording, horizon, lead, shooting)]
+    pieces = [
+        piece for i, recording in enumerate(recordings) for piece in _pieces(i, recording, horizon, lead, shooting)
+    ]
     if not pieces:
         shortest = FIRST_START + LOOK_AHEAD
         names = ", ".join(r.name for r in recordings)

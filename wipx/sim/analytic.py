@@ -161,6 +161,7 @@ class _Run:
         self.joints = joints
         self.pattern = [*joints, *(2 + j for j in joints)]
         self.substeps = inputs.substeps(simulator.step)
+        self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
         self.out = np.zeros((self.rows + 1, 4, self.lanes))
         late = bool(self.coefficients.present[R.ON_SENSOR_DELAY])
         self.past = np.zeros((self.rows + 1, 4, self.lanes) if late else (1, 4, 1))
@@ -190,6 +191,7 @@ class _Run:
                 states,
                 self.inputs.t,
                 commands,
+                self.row_steps,
                 self.substeps,
                 per_lane,
                 closed,

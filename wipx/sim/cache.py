@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import numba
+from numba.core import config as numba_settings
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -35,6 +36,6 @@ def _cache_folder() -> Path:
 def cached(function):
     """Compile a kernel, kept on disk for the next run."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        numba.config.CACHE_DIR = str(_cache_folder())  # pyright: ignore[reportAttributeAccessIssue]
+        setattr(numba_settings, "CACHE_DIR", str(_cache_folder()))
     flags = {"nsz", "arcp", "contract", "afn", "reassoc"}
     return numba.njit(fastmath=flags, error_model="numpy", nogil=True, cache=True, boundscheck=False)(function)

@@ -205,13 +205,19 @@ def _replace(f: _Filler, name: str, flag: int | None, targets: dict[str, int]) -
 def _joint(f: _Filler, site: str, j: int) -> None:
     f.add(f"{site}/viscous", R.ON_DAMPING, sigma=R.VISCOUS + j)
     f.add(f"{site}/quadratic_drag", R.ON_DRAG + j, c=R.DRAG + j)
-    for name, plus, minus in (("coulomb", "F_c", "F_c"), ("asymmetric_coulomb", "F_plus", "F_minus"), ("stribeck", "F_c", "F_c")):
+    for name, plus, minus in (
+        ("coulomb", "F_c", "F_c"),
+        ("asymmetric_coulomb", "F_plus", "F_minus"),
+        ("stribeck", "F_c", "F_c"),
+    ):
         f.add(f"{site}/{name}", R.ON_FRICTION, **{plus: R.LEVEL_PLUS + j})
         f.add(f"{site}/{name}", R.ON_FRICTION, **{minus: R.LEVEL_MINUS + j})
     stribeck = {"F_s": R.STATIC + j, "F_c": R.COULOMB + j, "v_s": R.STRIBECK_SPEED + j}
     _replace(f, f"{site}/stribeck", R.ON_STRIBECK + j, stribeck)
     _replace(f, f"{site}/sticky_spot", R.ON_SPOT, {"F_c": R.SPOT, "lo": R.SPOT_LOW, "hi": R.SPOT_HIGH})
-    _replace(f, f"{site}/load_friction", R.ON_LOAD + j, {"K_motor": R.LOAD_MOTOR + j, "K_external": R.LOAD_EXTERNAL + j})
+    _replace(
+        f, f"{site}/load_friction", R.ON_LOAD + j, {"K_motor": R.LOAD_MOTOR + j, "K_external": R.LOAD_EXTERNAL + j}
+    )
     if f.present[[R.ON_SPOT, R.ON_LOAD + j]].any():
         f.present[R.ON_FRICTION] = True
     _replace(f, f"{site}/presliding", R.ON_BRISTLE + j, {"stiffness": R.BRISTLE + j, "F_c": R.SLIDING + j})

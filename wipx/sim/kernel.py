@@ -18,7 +18,16 @@ Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, ch. 10).
 import numpy as np
 
 from wipx.core.law import clip, inlined, law, maximum, minimum, relaxing, sign, sin_cos
-from wipx.effects import backlash, dead_zone, lagged_stribeck, load_friction, quadratic_drag, speed_limit, sticky_spot, stribeck
+from wipx.effects import (
+    backlash,
+    dead_zone,
+    lagged_stribeck,
+    load_friction,
+    quadratic_drag,
+    speed_limit,
+    sticky_spot,
+    stribeck,
+)
 from wipx.effects.presliding import bristle, bristle_rate
 from wipx.sim import rows as R
 from wipx.sim.cache import cached
@@ -81,9 +90,8 @@ def _actuator(S, on, j):
         a = (R.LAGGED + j) * W
         for w in range(W):
             rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
-            kept, mean = relaxing(S[R.STEP * W + w] * S[R.LAG_RATE * W + w])
-            S[a + w] = S[u + w] + rest * kept
-            S[u + w] += rest * mean
+            S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w]
+            S[u + w] += rest * S[R.LAG_MEAN * W + w]
     if on[R.ON_RIPPLE]:
         for w in range(W):
             angle = S[R.RIPPLE_PERIODS * W + w] * S[(R.MID + j) * W + w] + S[R.RIPPLE_PHASE * W + w]
@@ -238,9 +246,8 @@ def _smooth_friction(S, on, j):
                 S[(R.PAPER_EPSILON + j) * W + w],
             )
             rest = S[R.STARTED * W + w] * (S[(R.PAPER + j) * W + w] - steady)
-            kept, mean = relaxing(S[R.STEP * W + w] * S[(R.PAPER_RATE + j) * W + w])
-            S[(R.PAPER + j) * W + w] = steady + rest * kept
-            S[(R.FORCE + j) * W + w] -= steady + rest * mean
+            S[(R.PAPER + j) * W + w] = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
+            S[(R.FORCE + j) * W + w] -= steady + rest * S[(R.PAPER_MEAN + j) * W + w]
 
 
 @law
@@ -362,11 +369,9 @@ def _interpolate(past, t_rows, window, k, j, lane, moment):
 def _record(S, on, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
     for j in range(2):
-        coordinate = out[k, j, lane0 : lane0 + count]
-        rate = out[k, 2 + j, lane0 : lane0 + count]
-        for w in range(count):
-            coordinate[w] = (1.0 + S[(R.SCALE + j) * W + w]) * S[(R.Q + j) * W + w] + S[(R.BIAS + j) * W + w]
-            rate[w] = S[(R.V + j) * W + w]
+        for w in range(W):
+            true = S[(R.Q + j) * W + w]
+            S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * true + S[(R.BIAS + j) * W + w]
     if on[R.ON_SENSOR_DELAY]:
         for j in range(2):
             for w in range(count):
@@ -374,54 +379,64 @@ def _record(S, on, past, t_rows, lanes, k, out, lane0, count):
                 past[k, 2 + j, lane0 + w] = S[(R.V + j) * W + w]
                 moment = t_rows[k, lanes[0, w]] - S[(R.SENSOR_DELAY + j) * W + w]
                 late = _interpolate(past, t_rows, lanes[0, w], k, j, lane0 + w, moment)
-                out[k, j, lane0 + w] = (1.0 + S[(R.SCALE + j) * W + w]) * late + S[(R.BIAS + j) * W + w]
+                S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * late + S[(R.BIAS + j) * W + w]
+    for j in range(2):
+        out[k, j, lane0 : lane0 + count] = S[(R.SHOWN + j) * W : (R.SHOWN + j) * W + count]
+        out[k, 2 + j, lane0 : lane0 + count] = S[(R.V + j) * W : (R.V + j) * W + count]
 
 
 @law
-def _feedback(t_rows, u_rows, out, lanes, k, lane0, count, gains, references, noise, filtered, settings):
+def _feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
     """State feedback u = -K (y - y_ref) on what the sensors show, at the rows of the log."""
     smoothing, limit = settings[0], settings[1]
-    block = slice(lane0, lane0 + count)
+    for i in range(4):
+        S[(R.NOISE + i) * W : (R.NOISE + i) * W + count] = noise[k, i, lane0 : lane0 + count]
+        reference = references[k, i]
+        for w in range(W):
+            S[(R.REFERENCE + i) * W + w] = reference[lanes[0, w]]
+    if smoothing >= 0.0:  # rates from differences of the coordinates, through a low-pass
+        for w in range(W):
+            window = lanes[0, w]
+            S[R.TIME * W + w] = t_rows[k, window] - t_rows[max(k, 1) - 1, window]
     for j in range(2):
-        shown, rate = out[k, j, block], out[k, 2 + j, block]
-        noise_shown, noise_rate = noise[k, j, block], noise[k, 2 + j, block]
-        last, last_rate = filtered[j], filtered[2 + j]
         if smoothing < 0.0:
-            for w in range(count):
-                last_rate[w] = rate[w] + noise_rate[w]
-        else:  # rates from differences of the coordinates, through a low-pass
-            for w in range(count):
-                window = lanes[0, w]
-                dt = t_rows[max(k, 1), window] - t_rows[max(k, 1) - 1, window]
-                difference = (shown[w] + noise_shown[w] - last[w]) / dt
-                last_rate[w] = last_rate[w] + dt / (dt + smoothing) * (difference - last_rate[w]) if k > 0 else 0.0
-        for w in range(count):
-            last[w] = shown[w] + noise_shown[w]
+            for w in range(W):
+                S[(R.MEASURED_RATE + j) * W + w] = S[(R.V + j) * W + w] + S[(R.NOISE_RATE + j) * W + w]
+        else:
+            for w in range(W):
+                dt = S[R.TIME * W + w]
+                moved = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w] - S[(R.MEASURED + j) * W + w]
+                rate = S[(R.MEASURED_RATE + j) * W + w]
+                filtered = rate + (moved - rate * dt) / (dt + smoothing)
+                S[(R.MEASURED_RATE + j) * W + w] = filtered if k > 0 else 0.0
+        for w in range(W):
+            S[(R.MEASURED + j) * W + w] = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w]
     for c in range(2):
-        command = u_rows[k, c, block]
-        for w in range(count):
-            command[w] = 0.0
-        for i in range(4):
-            reference, measured = references[k, i], filtered[i]
-            for w in range(count):
-                command[w] -= gains[c, i] * (measured[w] - reference[lanes[0, w]])
-        for w in range(count):
-            command[w] = minimum(maximum(command[w], -limit), limit)
+        k0, k1, k2, k3 = gains[c, 0], gains[c, 1], gains[c, 2], gains[c, 3]
+        for w in range(W):
+            u = -k0 * (S[R.MEASURED * W + w] - S[R.REFERENCE * W + w])
+            u -= k1 * (S[R.MEASURED1 * W + w] - S[R.REFERENCE1 * W + w])
+            u -= k2 * (S[R.MEASURED_RATE * W + w] - S[R.REFERENCE_RATE * W + w])
+            u -= k3 * (S[R.MEASURED_RATE1 * W + w] - S[R.REFERENCE_RATE1 * W + w])
+            S[(R.COMMAND + c) * W + w] = clip(u, -limit, limit)
+        u_rows[k, c, lane0 : lane0 + count] = S[(R.COMMAND + c) * W : (R.COMMAND + c) * W + count]
 
 
 @law
-def _begin_row(S, t_rows, u_rows, substeps, lanes, counts, k):
-    """Load the command and the step of row k; the smallest and the largest number of steps."""
+def _begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k):
+    """Load the step of row k; the smallest and the largest number of steps."""
     least, most = substeps[k, lanes[0, 0]], 0
+    steps, numbers = row_steps[k], substeps[k]
     for w in range(W):
         window = lanes[0, w]
-        n = substeps[k, window]
+        S[R.ROW_STEP * W + w] = steps[window]
+        n = numbers[window]
         counts[w] = n
         least, most = min(least, n), max(most, n)
-        S[R.TIME * W + w] = t_rows[k, window]
-        S[R.ROW_STEP * W + w] = (t_rows[k + 1, window] - t_rows[k, window]) / max(n, 1)
-        S[R.COMMAND * W + w] = u_rows[k, 0, lanes[1, w]]
-        S[R.COMMAND1 * W + w] = u_rows[k, 1, lanes[1, w]]
+    if on[R.ON_DELAY] or on[R.ON_EVENT]:
+        times = t_rows[k]
+        for w in range(W):
+            S[R.TIME * W + w] = times[lanes[0, w]]
     for w in range(W):
         S[R.COMMAND * W + w] *= S[R.INPUT_GAIN * W + w]
         S[R.COMMAND1 * W + w] *= S[R.INPUT_GAIN * W + w]
@@ -429,12 +444,33 @@ def _begin_row(S, t_rows, u_rows, substeps, lanes, counts, k):
 
 
 @law
-def _set_step(S, counts, s):
-    """The step of every lane: zero for one that is through with this row."""
+def _replay(S, u_rows, lanes, actuated, k):
+    """Load the recorded commands of row k."""
+    for j in range(2):
+        if actuated[j]:
+            commands = u_rows[k, j]
+            for w in range(W):
+                S[(R.COMMAND + j) * W + w] = commands[lanes[1, w]]
+
+
+@law
+def _set_step(S, on, counts, s):
+    """The step of every lane, zero for one that is through with this row, and what lags do in it."""
     for w in range(W):
         h = S[R.ROW_STEP * W + w]
         S[R.STEP * W + w] = h if s < counts[w] else 0.0
         S[R.PER_STEP * W + w] = 1.0 / h if s < counts[w] else 0.0
+    if on[R.ON_LAG]:
+        for w in range(W):
+            kept, mean = relaxing(S[R.STEP * W + w] * S[R.LAG_RATE * W + w])
+            S[R.LAG_KEPT * W + w] = kept
+            S[R.LAG_MEAN * W + w] = mean
+    for j in range(2):
+        if on[R.ON_PAPER + j]:
+            for w in range(W):
+                kept, mean = relaxing(S[R.STEP * W + w] * S[(R.PAPER_RATE + j) * W + w])
+                S[(R.PAPER_KEPT + j) * W + w] = kept
+                S[(R.PAPER_MEAN + j) * W + w] = mean
 
 
 @cached
@@ -445,6 +481,7 @@ def rollout(
     states,
     t_rows,
     u_rows,
+    row_steps,
     substeps,
     per_lane,
     closed,
@@ -468,7 +505,8 @@ def rollout(
         states: Start of each lane, shape (STATES, lanes); overwritten with the end.
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, 2, lanes) if `per_lane` (written in closed loop), else (K, 2, R).
-        substeps: Steps from each row to the next, shape (K, R); 0 holds the state.
+        row_steps: Length of the steps from each row to the next, shape (K, R) [s].
+        substeps: Their number, shape (K, R); 0 holds the state.
         per_lane: Whether every lane has commands of its own.
         closed: Whether `gains` close the loop; then `per_lane`.
         gains: State feedback, shape (2, 4).
@@ -484,7 +522,6 @@ def rollout(
     """
     windows = substeps.shape[1]
     S = np.zeros(R.N_ROWS * W)
-    filtered = np.zeros((4, W))
     pointers = np.zeros(W, dtype=np.int64)
     counts = np.zeros(W, dtype=np.int64)
     lanes = np.zeros((2, W), dtype=np.int64)
@@ -503,11 +540,13 @@ def rollout(
         for k in range(first_row, last_row):
             _record(S, on, past, t_rows, lanes, k, out, lane0, count)
             if closed:
-                _feedback(t_rows, u_rows, out, lanes, k, lane0, count, gains, references, noise, filtered, settings)
-            least, most = _begin_row(S, t_rows, u_rows, substeps, lanes, counts, k)
+                _feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
+            else:
+                _replay(S, u_rows, lanes, actuated, k)
+            least, most = _begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k)
             for s in range(most):
                 if s == 0 or s >= least:
-                    _set_step(S, counts, s)
+                    _set_step(S, on, counts, s)
                 _step(S, on, t_rows, u_rows, lanes, pointers, actuated)
         _record(S, on, past, t_rows, lanes, last_row, out, lane0, count)
         for w in range(count):

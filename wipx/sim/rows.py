@@ -41,14 +41,19 @@ the commands that act on them).
 # Scratch of one step.
 (
     STEP, PER_STEP, ROW_STEP, TIME,
+    LAG_KEPT, LAG_MEAN, PAPER_KEPT, PAPER_KEPT1, PAPER_MEAN, PAPER_MEAN1,  # of lags over one step
     MID, MID1, RATE, RATE1,  # coordinates and rates in mid-step
     COMMAND, COMMAND1, DRIVE, DRIVE1,  # command now, and the force that comes of it
     M11, M12, M22, COUPLING_NOW, GRAVITY_NOW,
     W11, W12, W22, NEXT, NEXT1,  # inverse of the mass matrix, rates at the end
     FORCE, FORCE1, DAMPING, DAMPING1, PLUS, PLUS1, MINUS, MINUS1,
     BRISTLE_KEPT, BRISTLE_KEPT1, BRISTLE_GAIN, BRISTLE_GAIN1,
+    SHOWN, SHOWN1,  # coordinates as the sensors show them
+    MEASURED, MEASURED1, MEASURED_RATE, MEASURED_RATE1,  # what the controller works with
+    NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
+    REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 35)  # fmt: skip
+) = range(N_STATES, N_STATES + 55)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 

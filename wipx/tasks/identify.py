@@ -139,7 +139,13 @@ def metrics(result: IdentificationResult) -> dict[str, object]:
         "schema": 1,
         "fit": {"horizon_s": result.fit.horizon, **{k: _errors(e) for k, e in errors.items() if e is not None}},
         "parameters": {
-            e.name: {"value": e.value, "ci95": [e.low, e.high], "unit": e.unit, "nominal": e.nominal, "at_bound": e.at_bound}
+            e.name: {
+                "value": e.value,
+                "ci95": [e.low, e.high],
+                "unit": e.unit,
+                "nominal": e.nominal,
+                "at_bound": e.at_bound,
+            }
             for e in result.estimates
         },
         "search": {

@@ -34,7 +34,8 @@ class Predict:
         model = read_model(job.model_path) if job.model_path else nominal
         if model.plant != nominal.plant:
             raise InputError(
-                f"{job.model_path}: a model of plant {model.plant.kind}, expected {nominal.plant.kind} as in {source.name}"
+                f"{job.model_path}: a model of plant {model.plant.kind}, "
+                f"expected {nominal.plant.kind} as in {source.name}"
             )
         recordings = source.load()
         judge = Judge(job.part("sim"), sensor_noise(recordings, model.plant), HORIZON, self.lead)

@@ -27,7 +27,9 @@ class SearchProgress:
         """Show where the search is."""
         self._bar.n = min(seconds, self._bar.total or seconds)
         left = max((self._bar.total or 0.0) - seconds, 0.0)
-        self._bar.set_postfix_str(f"{evaluations} evaluations, loss {best_loss:.4g}, at most {left:.0f} s left", refresh=False)
+        self._bar.set_postfix_str(
+            f"{evaluations} evaluations, loss {best_loss:.4g}, at most {left:.0f} s left", refresh=False
+        )
         self._bar.update(0)
 
     def __enter__(self) -> "SearchProgress":

@@ -6,12 +6,13 @@ minimum while that range shrinks, and ends with true sticking.
 """
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from scipy import optimize
 
-from wipx.identify.optimizers.search import BudgetSpent, Log, Minimum, Watcher, unwatched
-from wipx.identify.problem import ResidualProblem
+from wipx.identify.optimizers.search import BudgetSpentError, Log, Minimum, Watcher, unwatched
+from wipx.identify.problem import Problem
 
 SECANT = 0.02  # finite-difference step relative to the distance from the neutral value
 
@@ -38,17 +39,17 @@ class LeastSquares:
     evaluations: int = 20_000
     seconds: float = 1800.0  # the paper's cap, Sec. VI-C
 
-    def minimise(self, problem: ResidualProblem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
+    def minimise(self, problem: Problem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
         """The best of the searches; ends early within the budget."""
         log = Log("least_squares", self.evaluations, self.seconds, watcher)
         try:
             for start in self._starts(problem, rng, log):
                 self._follow(problem, start, log)
-        except BudgetSpent:
+        except BudgetSpentError:
             return log.minimum(log.spent())
         return log.minimum("converged")
 
-    def _starts(self, problem: ResidualProblem, rng: np.random.Generator, log: Log) -> np.ndarray:
+    def _starts(self, problem: Problem, rng: np.random.Generator, log: Log) -> np.ndarray:
         own = np.stack([problem.space.start, problem.space.neutral])
         log.add(own, problem.losses(own))
         if self.starts == 1:
@@ -59,13 +60,13 @@ class LeastSquares:
         best = cube[np.argsort(losses, kind="stable")[: self.starts - 1]]
         return np.concatenate([own[:1], best])
 
-    def _follow(self, problem: ResidualProblem, start: np.ndarray, log: Log) -> None:
+    def _follow(self, problem: Problem, start: np.ndarray, log: Log) -> None:
         """Follow the minimum from wide smoothing to none."""
         for level in self.smoothing:
             start = self._search(problem.smoothed(level), start, log)
             log.add(start[None], problem.losses(start[None]))
 
-    def _search(self, problem: ResidualProblem, start: np.ndarray, log: Log) -> np.ndarray:
+    def _search(self, problem: Problem, start: np.ndarray, log: Log) -> np.ndarray:
         # The start is about as far from the neutral value as the effect is large.
         reach = np.abs(problem.space.start - problem.space.neutral)
 
@@ -80,11 +81,11 @@ class LeastSquares:
         result = optimize.least_squares(
             residuals,
             np.clip(start, 1e-9, 1.0 - 1e-9),
-            jacobian,
+            jac=cast(Any, jacobian),  # SciPy's annotation knows the names of its own schemes only
             bounds=(0.0, 1.0),
             xtol=self.tolerance,
             ftol=self.tolerance,
-            gtol=None,
+            gtol=1e-12,
             max_nfev=self.iterations,
             x_scale="jac",
         )

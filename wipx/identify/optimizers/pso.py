@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wipx.identify.optimizers.search import BudgetSpent, Log, Minimum, Watcher, unwatched
+from wipx.identify.optimizers.search import BudgetSpentError, Log, Minimum, Watcher, unwatched
 from wipx.identify.problem import Problem
 
 
@@ -61,7 +61,7 @@ class ParticleSwarm:
                     init_pos=first,
                 )
                 swarm.optimize(losses, iters=self.iterations, verbose=False)
-        except BudgetSpent:
+        except BudgetSpentError:
             return log.minimum(log.spent())
         return log.minimum(f"{self.iterations} generations")
 

@@ -10,7 +10,7 @@ from wipx.core.results import SearchHistory
 from wipx.identify.problem import Problem
 
 
-class BudgetSpent(Exception):
+class BudgetSpentError(Exception):
     """Ends a search from inside a library's loop; the best point so far is the result."""
 
 
@@ -77,7 +77,7 @@ class Log:
         """Note the losses (P,) of positions (P, D).
 
         Raises:
-            BudgetSpent: the budget of evaluations or seconds is used up.
+            BudgetSpentError: the budget of evaluations or seconds is used up.
         """
         self.failed += int(np.sum(~np.isfinite(losses)))
         finite = np.where(np.isfinite(losses), losses, np.inf)
@@ -90,14 +90,14 @@ class Log:
         """Count evaluations whose losses do not compare with the others.
 
         Raises:
-            BudgetSpent: as `add`.
+            BudgetSpentError: as `add`.
         """
         self.count += evaluations
         spent = time.monotonic() - self.began
         self.course.append((self.count, spent, self.best_loss))
         self.watcher(self.count, spent, self.best_loss)
         if self.count >= self.evaluations or spent >= self.seconds:
-            raise BudgetSpent
+            raise BudgetSpentError
 
     def minimum(self, stopped: str) -> Minimum:
         """The result so far."""
