@@ -5,7 +5,7 @@ READY := .venv/.ready
 RECORDINGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow check bench lock clean
+.PHONY: help setup demo real test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -22,6 +22,10 @@ $(READY): requirements.lock pyproject.toml
 
 demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder identifies that robot instead
 	$(PY) -m wipx $(if $(RECORDINGS),task=identify "recordings.path='$(RECORDINGS)'",task=pipeline)
+
+real: $(READY)  ## identify public recordings of real robots: the table of docs/real_recordings.md and README's picture
+	$(PY) -m wipx task=real_recordings task.page=docs/real_recordings.md hydra.run.dir=runs/real
+	cp runs/real/dfki_double_friction/fit.png docs/images/real_before_after.png
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -m "not slow"

@@ -11,6 +11,7 @@ from wipx.app import configuration_folder
 from wipx.config import build
 from wipx.core.errors import InputError
 from wipx.core.recording import Recording
+from wipx.identify.closed_loop import ClosedLoopProblem
 from wipx.identify.objectives import FitData, Objective, PaperTrajectories
 from wipx.identify.parameter_space import parameter_space, scales_of
 
@@ -37,7 +38,9 @@ def problem_of(objective: Objective, recordings: tuple[Recording, ...], *, close
     space = parameter_space(model, tuple(HIDDEN), {}, {}, {}, scales)
     feedback = (controller("pendulum"), RATE) if closed else None
     speeds = (scales["pitch"].velocity,)
-    return objective.problem(FitData(recordings, PENDULUM, SIMULATOR, sensor_deviations(PENDULUM), speeds, feedback), space)
+    return objective.problem(
+        FitData(recordings, PENDULUM, SIMULATOR, sensor_deviations(PENDULUM), speeds, feedback), space
+    )
 
 
 def test_a_known_parameter_is_found(objective: Objective, recordings: tuple[Recording, ...]):
@@ -98,7 +101,13 @@ def test_the_paper_objective_refuses_a_recording_that_is_too_short(recordings: t
 def test_the_paper_objective_averages_recordings_of_a_class():
     same = ROBOT.record(np.random.default_rng(22), 2)
     twice = tuple(Recording(f"release_{i}.csv", dict(r.columns)) for i, r in enumerate(same))
-    problem = problem_of(PaperTrajectories(classes=r"(\w+)_\d"), twice)
-    assert problem.target.shape == (80, 1, 1)
-    alone = [problem_of(PaperTrajectories(), (r,)).target[:, 0, 0] for r in twice]
-    np.testing.assert_allclose(problem.target[:, 0, 0], np.mean(alone, axis=0))
+    mean = mean_trajectories(PaperTrajectories(classes=r"(\w+)_\d"), twice)
+    assert mean.shape == (80, 1, 1)
+    alone = [mean_trajectories(PaperTrajectories(), (r,)) for r in twice]
+    np.testing.assert_allclose(mean, np.mean(alone, axis=0))
+
+
+def mean_trajectories(objective: PaperTrajectories, recordings: tuple[Recording, ...]) -> np.ndarray:
+    problem = problem_of(objective, recordings)
+    assert isinstance(problem, ClosedLoopProblem)
+    return problem.target

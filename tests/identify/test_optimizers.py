@@ -17,6 +17,7 @@ from wipx.config import build
 from wipx.core.parameters import FreeParameter
 from wipx.identify.optimizers.least_squares import LeastSquares
 from wipx.identify.optimizers.pso import ParticleSwarm
+from wipx.identify.optimizers.search import Progress
 from wipx.identify.parameter_space import ParameterSpace
 
 OPTIONS = sorted(path.stem for path in (configuration_folder() / "optimizer").glob("*.yaml"))
@@ -77,7 +78,14 @@ def test_the_same_seed_gives_the_same_result(optimizer):
 
 
 def test_the_best_loss_never_rises_and_effort_never_falls(optimizer, fresh_seed: int):
-    history = optimizer.minimise(CurvedValley(), np.random.default_rng(fresh_seed)).history
+    shares: list[float] = []
+
+    def watch(progress: Progress) -> None:
+        shares.append(progress.share)
+
+    history = optimizer.minimise(CurvedValley(), np.random.default_rng(fresh_seed), watch).history
+    assert np.all(np.diff(shares) >= 0.0)
+    assert 0.0 <= shares[0] <= shares[-1] <= 1.0
     assert np.all(np.diff(history.best_loss) <= 0.0)
     assert np.all(np.diff(history.evaluations) >= 0)
     assert np.all(np.diff(history.seconds) >= 0.0)
@@ -103,8 +111,8 @@ def test_the_budget_of_time_ends_the_search(optimizer):
 def test_a_watcher_sees_the_progress_and_can_cancel(optimizer):
     seen: list[tuple[int, float]] = []
 
-    def cancel_late(evaluations: int, seconds: float, best_loss: float) -> None:
-        seen.append((evaluations, best_loss))
+    def cancel_late(progress: Progress) -> None:
+        seen.append((progress.evaluations, progress.best_loss))
         if len(seen) == 3:
             raise KeyboardInterrupt
 
@@ -124,23 +132,23 @@ def test_candidates_that_fell_over_are_counted_and_never_chosen(optimizer):
 def test_global_state_is_left_alone(optimizer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     np.random.seed(7)
-    before, environment, level = np.random.get_state()[1].tolist(), dict(os.environ), logging.getLogger().level
+    before, environment, level = np.random.get_state(), dict(os.environ), logging.getLogger().level
     optimizer.minimise(CurvedValley(), np.random.default_rng(7))
-    assert np.random.get_state()[1].tolist() == before
+    np.testing.assert_equal(np.random.get_state(), before)
     assert logging.getLogger().level == level
     assert dict(os.environ) == environment
     assert list(tmp_path.iterdir()) == []
 
 
 def test_global_state_is_left_alone_by_a_search_that_is_cancelled(optimizer):
-    def cancel(evaluations: int, seconds: float, best_loss: float) -> None:
+    def cancel(progress: Progress) -> None:
         raise KeyboardInterrupt
 
     np.random.seed(8)
-    before = np.random.get_state()[1].tolist()
+    before = np.random.get_state()
     with pytest.raises(KeyboardInterrupt):
         optimizer.minimise(CurvedValley(), np.random.default_rng(8), cancel)
-    assert np.random.get_state()[1].tolist() == before
+    np.testing.assert_equal(np.random.get_state(), before)
     assert "LOG_CFG" not in os.environ
 
 

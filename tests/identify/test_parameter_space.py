@@ -38,9 +38,7 @@ LINEAR_AND_LOGARITHMIC = ParameterSpace(
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_the_cube_maps_to_values_and_back(first: float, second: float):
     cube = np.array([first, second])
-    np.testing.assert_allclose(
-        LINEAR_AND_LOGARITHMIC.to_cube(LINEAR_AND_LOGARITHMIC.to_values(cube)), cube, atol=1e-12
-    )
+    np.testing.assert_allclose(LINEAR_AND_LOGARITHMIC.to_cube(LINEAR_AND_LOGARITHMIC.to_values(cube)), cube, atol=1e-12)
 
 
 def test_corners_of_the_cube_are_the_bounds():
@@ -126,7 +124,9 @@ def test_a_name_or_an_interval_at_fault_is_refused_in_one_line(arguments: dict, 
 
 
 def test_an_effect_that_the_plant_lacks_is_refused_with_those_that_it_has():
-    with pytest.raises(InputError, match=r"unknown effect of plant pendulum 'translation/coulomb'.*valid: .*pitch/coulomb"):
+    with pytest.raises(
+        InputError, match=r"unknown effect of plant pendulum 'translation/coulomb'.*valid: .*pitch/coulomb"
+    ):
         space_of("translation/coulomb")
 
 

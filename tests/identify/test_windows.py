@@ -112,12 +112,13 @@ def test_recordings_keep_their_own_time(recording: Recording):
     windows = contract_windows(recording, moved)
     np.testing.assert_array_equal(windows.recording, np.repeat([0, 1], 5))
     np.testing.assert_allclose(windows.starts[5:], windows.starts[:5] + 100.0)
-    np.testing.assert_allclose(predicted(moved), predicted(recording), atol=1e-6)  # rounding of t, where the joint sticks
+    # Rounding of t reaches 1e-7 rad where the joint sticks.
+    np.testing.assert_allclose(predicted(moved), predicted(recording), atol=1e-6)
 
 
 def test_a_recording_shorter_than_a_window_is_refused_in_one_line(recording: Recording):
     short = Recording("short.csv", dict(recording.between(0.0, 0.5).columns), "folder/short.csv")
-    with pytest.raises(InputError, match=r"^folder/short\.csv: 0\.496 s long, expected more than 0\.55 s .*record longer$"):
+    with pytest.raises(InputError, match=r"^folder/short\.csv: 0\.496 s long, expected more than 0\.55 s .* longer$"):
         contract_windows(recording, short)
 
 

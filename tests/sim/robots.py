@@ -6,6 +6,7 @@ so that the compiled simulator is checked against something that shares no code 
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -149,7 +150,7 @@ def reference(model: Model, initial, t: np.ndarray, forces: Forces) -> Motion:
     """
     n = len(model.plant.joints)
     states = [np.array(initial, dtype=float)]
-    for row, (begin, end) in enumerate(zip(t[:-1], t[1:], strict=True)):
+    for row, (begin, end) in enumerate(pairwise(t)):
 
         def slope(time: float, y: np.ndarray, row: int = row) -> np.ndarray:
             q, v = y[:n], y[n:]

@@ -166,4 +166,6 @@ def test_the_work_of_the_command_is_the_gain_of_energy():
     motion = move(model, LIVELY["wip"], t, commands)
     e = energy(model, motion)
     work = np.sum(commands[:, 0] * np.diff(motion.q[:, 0]))  # exact: each command is constant over its row
-    assert e[-1] - e[0] == pytest.approx(work, abs=2e-3)  # breathing of the integrator at 1 ms, measured without command
+    assert e[-1] - e[0] == pytest.approx(
+        work, abs=2e-3
+    )  # breathing of the integrator at 1 ms, measured without command

@@ -1,11 +1,14 @@
 """Dry friction: true sticking, sliding against events located exactly, and no reversal."""
 
+from dataclasses import dataclass
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from sim.robots import Effects, Motion, inner_forces, mass_matrix, move, robot, sines
+from sim.robots import Motion, inner_forces, mass_matrix, move, robot, sines
 
 from wipx.core.model import Model
 from wipx.sim.analytic import AnalyticSimulator
@@ -59,12 +62,17 @@ def test_one_joint_of_a_double_pendulum_slides_while_the_other_sticks(stuck: int
 
 @settings(max_examples=30)
 @given(
-    level=st.floats(0.01, 5.0), speed=st.floats(-2.0, 2.0), static=st.floats(1.0, 2.0), step=st.sampled_from([1e-3, 4e-3])
+    level=st.floats(0.01, 5.0),
+    speed=st.floats(-2.0, 2.0),
+    static=st.floats(1.0, 2.0),
+    step=st.sampled_from([1e-3, 4e-3]),
 )
 def test_friction_stops_a_motion_and_never_reverses_it(level: float, speed: float, static: float, step: float):
     stribeck = {"F_c": level, "F_s": static * level, "v_s": 0.1}
     t = np.linspace(0.0, 3.0, 301)
-    v = move(robot("linear_axis", {"translation/stribeck": stribeck}), (0.0, speed), t, simulator=AnalyticSimulator(step)).v[:, 0]
+    v = move(
+        robot("linear_axis", {"translation/stribeck": stribeck}), (0.0, speed), t, simulator=AnalyticSimulator(step)
+    ).v[:, 0]
     assert np.all(v * speed >= -1e-15)
     rests = t > 2.5 * abs(speed) / level + step  # mass 2.5 kg; the bump only stops it sooner
     assert np.max(np.abs(v[rests]), initial=0.0) < 1e-12
@@ -84,50 +92,68 @@ def test_no_smoothing_has_no_creep_and_smoothing_creeps_at_its_speed():
     assert creeping.v[-1, 0] == pytest.approx(0.5e-3, rel=1e-6)  # half the level, half the speed
 
 
-def coulomb_reference(model: Model, initial, t: np.ndarray, commands: np.ndarray, level: float) -> Motion:
-    """Coulomb friction on the first joint, every stop and start of it located (`solve_ivp` events)."""
-    n = len(model.plant.joints)
+@dataclass(frozen=True)
+class CoulombJoint:
+    """A robot whose first joint has Coulomb friction: slides up (mode 1), sticks (0), slides down (-1)."""
 
-    def pull(y: np.ndarray, u: float, friction: float) -> np.ndarray:
-        forces = inner_forces(model, y[:n], y[n:])
+    model: Model
+    level: float
+
+    def accelerations(self, y: np.ndarray, u: float, mode: float) -> np.ndarray:
+        n = len(self.model.plant.joints)
+        matrix, pull = mass_matrix(self.model, y[:n]), self._pull(y, u, -mode * self.level)
+        if mode:
+            return np.linalg.solve(matrix, pull)
+        free = np.zeros(n)  # the first joint held, the others free
+        free[1:] = np.linalg.solve(matrix[1:, 1:], pull[1:])
+        return free
+
+    def needed(self, y: np.ndarray, u: float) -> float:
+        """Friction force that would hold the first joint [N]."""
+        n = len(self.model.plant.joints)
+        inertial = mass_matrix(self.model, y[:n]) @ self.accelerations(y, u, 0.0)
+        return float(inertial[0] - self._pull(y, u, 0.0)[0])
+
+    def mode(self, y: np.ndarray, u: float) -> float:
+        speed = y[len(self.model.plant.joints)]
+        if speed == 0.0 and abs(self.needed(y, u)) > self.level:
+            return float(-np.sign(self.needed(y, u)))
+        return float(np.sign(speed))
+
+    def _pull(self, y: np.ndarray, u: float, friction: float) -> np.ndarray:
+        n = len(self.model.plant.joints)
+        forces = inner_forces(self.model, y[:n], y[n:])
         forces[0] += u + friction
         return forces
 
-    def accelerations(y: np.ndarray, u: float, mode: float) -> np.ndarray:
-        matrix = mass_matrix(model, y[:n])
-        if mode:
-            return np.linalg.solve(matrix, pull(y, u, -mode * level))
-        stuck = np.zeros(n)  # the first joint held, the others free
-        stuck[1:] = np.linalg.solve(matrix[1:, 1:], pull(y, u, 0.0)[1:])
-        return stuck
 
-    def needed(y: np.ndarray, u: float) -> float:
-        """Friction force that would hold the first joint."""
-        return float((mass_matrix(model, y[:n]) @ accelerations(y, u, 0.0) - pull(y, u, 0.0))[0])
+def until_event(joint: CoulombJoint, y: np.ndarray, u: float, begin: float, end: float) -> tuple[float, np.ndarray]:
+    """Time and state at `end`, or where the first joint stops or breaks loose before."""
+    n, mode = len(y) // 2, joint.mode(y, u)
 
-    y = np.array(initial, dtype=float)
-    states = [y.copy()]
-    for k, u in enumerate(commands[:, 0]):
-        now = t[k]
-        while now < t[k + 1]:
-            mode = np.sign(y[n])
-            if mode == 0.0 and abs(needed(y, u)) > level:
-                mode = -np.sign(needed(y, u))
+    def slope(_: float, s: np.ndarray) -> np.ndarray:
+        return np.concatenate([s[n:], joint.accelerations(s, u, mode)])
 
-            def slope(_: float, s: np.ndarray, u: float = u, mode: float = mode) -> np.ndarray:
-                return np.concatenate([s[n:], accelerations(s, u, mode)])
+    def event(_: float, s: np.ndarray) -> float:
+        return s[n] * mode if mode else joint.level - abs(joint.needed(s, u))
 
-            def event(_: float, s: np.ndarray, u: float = u, mode: float = mode) -> float:
-                return s[n] * mode if mode else level - abs(needed(s, u))
+    event.terminal, event.direction = True, -1.0
+    solution = solve_ivp(slope, (begin, end), y, method="DOP853", rtol=1e-10, atol=1e-12, events=event)
+    y = solution.y[:, -1].copy()
+    if solution.status == 1:  # at a stop; or it breaks loose, in the sense of the force
+        y[n] = 0.0 if mode else -1e-12 * np.sign(joint.needed(y, u))
+    return float(solution.t[-1]), y
 
-            event.terminal, event.direction = True, -1.0
-            solution = solve_ivp(slope, (now, t[k + 1]), y, method="DOP853", rtol=1e-10, atol=1e-12, events=event)
-            now, y = solution.t[-1], solution.y[:, -1]
-            if solution.status == 1 and mode:
-                y[n] = 0.0
-            elif solution.status == 1:
-                y[n] = -1e-12 * np.sign(needed(y, u))  # it breaks loose in the sense of the force
-        states.append(y.copy())
+
+def coulomb_reference(model: Model, initial, t: np.ndarray, commands: np.ndarray, level: float) -> Motion:
+    """Coulomb friction on the first joint, every stop and start of it located (`solve_ivp` events)."""
+    n, joint = len(model.plant.joints), CoulombJoint(model, level)
+    states = [np.array(initial, dtype=float)]
+    for u, (now, end) in zip(commands[:, 0], pairwise(t), strict=True):
+        y = states[-1]
+        while now < end:
+            now, y = until_event(joint, y, u, now, end)
+        states.append(y)
     path = np.array(states)
     return Motion(t, path[:, :n], path[:, n:])
 
@@ -142,7 +168,9 @@ def test_sliding_through_reversals_follows_located_events_at_first_order():
     assert reversals > 5
     errors = []
     for step in (1e-3, 1e-4):
-        motion = move(robot("linear_axis", {"translation/coulomb": {"F_c": 1.0}}), start, t, commands, AnalyticSimulator(step))
+        motion = move(
+            robot("linear_axis", {"translation/coulomb": {"F_c": 1.0}}), start, t, commands, AnalyticSimulator(step)
+        )
         errors.append(np.max(np.abs(motion.v - exact.v)))
         # The step that holds a reversal has the friction of one side: at most 2 F_c h / M each time.
         assert errors[-1] <= 2.0 * 1.0 * step / 2.5 * reversals
@@ -165,7 +193,13 @@ def test_a_falling_wip_with_wheels_that_stick_and_slide_follows_located_events()
     exact = coulomb_reference(robot("wip"), (0.0, 0.02, 0.0, 0.0), t, commands, 3.0)
     assert np.any(exact.v[1:, 0] == 0.0)
     assert np.any(exact.v[1:, 0] != 0.0)
-    motion = move(robot("wip", {"translation/coulomb": {"F_c": 3.0}}), (0.0, 0.02, 0.0, 0.0), t, commands, AnalyticSimulator(2.5e-4))
+    motion = move(
+        robot("wip", {"translation/coulomb": {"F_c": 3.0}}),
+        (0.0, 0.02, 0.0, 0.0),
+        t,
+        commands,
+        AnalyticSimulator(2.5e-4),
+    )
     # 2 F_c h / M = 4e-4 m/s per reversal (M11 = 4.4 kg), grown by exp(6/s * 0.6 s) as the body falls.
     np.testing.assert_allclose(motion.v, exact.v, atol=1e-2)
     np.testing.assert_allclose(motion.q, exact.q, atol=1e-3)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-Damage = Callable[..., None]
+Damage = Callable[..., object]
 
 
 def write_model(folder, change: dict) -> None:
@@ -27,7 +27,10 @@ def replace_parameter(folder, **parameters: float | None) -> None:
 
 
 RECORDINGS: dict[str, tuple[Damage, list[str]]] = {
-    "missing column": (lambda f: f.write([line.rpartition(",")[0] for line in f.lines]), ["b.csv", "column u", "missing"]),
+    "missing column": (
+        lambda f: f.write([line.rpartition(",")[0] for line in f.lines]),
+        ["b.csv", "column u", "missing"],
+    ),
     "unknown unit": (
         lambda f: f.describe({**f.robot, "signals": {"theta": {"column": "theta", "unit": "furlong"}}}),
         ["robot.yaml", "theta", "furlong"],
@@ -37,8 +40,8 @@ RECORDINGS: dict[str, tuple[Damage, list[str]]] = {
     "not a number": (lambda f: f.cell(9, 1, "NaN"), ["b.csv", "line 9", "theta", "NaN"]),
     "text": (lambda f: f.cell(9, 2, "off"), ["b.csv", "line 9", "u is 'off'"]),
     "empty file": (lambda f: f.write([]), ["b.csv", "empty"]),
-    "header alone": (lambda f: f.write(f.lines[:1]), ["b.csv", "0 rows"]),
-    "shorter than a window": (lambda f: f.write(f.lines[:50]), ["b.csv", "0.48 s long", "0.55 s"]),
+    "header alone": (lambda f: f.write(f.lines[:1]), ["b.csv", "a header line but no row"]),
+    "shorter than a window": (lambda f: f.write(f.lines[:50]), ["b.csv", "s long, expected more than 0.55 s"]),
     "ragged row": (lambda f: f.write([*f.lines, "9.9,0"]), ["b.csv", "line 202"]),
     "no recordings": (lambda f: [p.unlink() for p in f.path.glob("*.csv")], ["swing", "no recordings"]),
     "no robot": (lambda f: (f.path / "robot.yaml").unlink(), ["robot.yaml is missing"]),
@@ -53,7 +56,7 @@ RECORDINGS: dict[str, tuple[Damage, list[str]]] = {
     ),
 }
 MODELS: dict[str, tuple[Damage, list[str]]] = {
-    "missing": (lambda f: None, ["model.yaml", "exist"]),
+    "missing": (lambda f: None, ["model.yaml", "No such file", "check the path"]),
     "a table": (lambda f: (f.path.parent / "model.yaml").write_text("t,x\n0,1\n"), ["model.yaml", "expected"]),
     "of another plant": (
         lambda f: write_model(f, {"plant": "linear_axis", "parameters": {"body_mass": 1, "wheel_mass": 1}}),
@@ -73,11 +76,14 @@ ARGUMENTS: dict[str, tuple[list[str], list[str]]] = {
     "task": (["task=predit"], ["task", "'predit'", "did you mean predict?"]),
     "optimizer": (["task=identify", "optimizer=adam"], ["optimizer", "'adam'", "least_squares, pso"]),
     "effect": (["task=identify", "effects=[pitch/colomb]"], ["'pitch/colomb'", "did you mean pitch/coulomb?"]),
-    "effect of another plant": (["task=identify", "effects=[translation/coulomb]"], ["pendulum", "translation/coulomb"]),
+    "effect of another plant": (
+        ["task=identify", "effects=[translation/coulomb]"],
+        ["pendulum", "translation/coulomb"],
+    ),
     "recordings": (["recordings=moon"], ["recordings", "'moon'", "folder"]),
     "folder": (["recordings.path=nowhere"], ["recordings.path nowhere does not exist"]),
     "free parameter": (["task=identify", "free.body_mas=0.1"], ["'body_mas'", "did you mean body_mass?"]),
-    "bounds": (["task=identify", "bounds={pitch/stribeck.F_c: [0, 1]}"], ["bounds", "pitch/coulomb.F_c"]),
+    "bounds": (["task=identify", "bounds={pitch/stribeck.F_c: [0.0, 1.0]}"], ["bounds", "pitch/coulomb.F_c"]),
     "friction that excludes another": (
         ["task=identify", "effects=[pitch/stribeck]"],
         ["pitch/coulomb", "pitch/stribeck", "keep one"],

@@ -69,10 +69,17 @@ def test_the_run_is_logged(program, folder, tmp_path: Path):
         figures = dict(database.execute("select key, value from latest_metrics"))
         (status,) = database.execute("select status from runs").fetchone()
     assert status == "FINISHED"
-    assert parameters["optimizer.starts"] == "1"
+    assert parameters["seed"] == "0"
+    assert any("least_squares" in value for value in parameters.values())
     assert {"fit/nominal/theta", "fit/completed/theta", "parameter/pitch/coulomb.F_c"} <= set(figures)
     artifacts = {path.name for path in (tmp_path / "tracked").rglob("*")}
     assert {"model.yaml", "metrics.json", "report.html", "fit.png"} <= artifacts
+
+
+def test_bounds_may_be_whole_numbers(program, folder, tmp_path: Path):
+    arguments = ("bounds={pitch/coulomb.F_c: [0, 1]}", f"recordings.path={folder.path}", "hydra.run.dir=out")
+    answer = program(*FAST, *arguments)
+    assert (answer.status, answer.error) == (0, "")
 
 
 def test_an_interrupted_search_leaves_one_line_and_no_file(folder, tmp_path: Path):

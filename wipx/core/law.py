@@ -79,21 +79,23 @@ def turns(angle):
 
 @law
 def sin_cos(angle):
-    """Sine and cosine of any `angle` [rad], absolute error below 1e-12 for |angle| < 1e4.
+    """Sine and cosine of any `angle` [rad], absolute error below 1e-12 for |angle| < 1e3.
 
     Reduced to half the angle in [-pi/2, pi/2], Taylor polynomials, double-angle formula.
     """
     k = turns(angle)
     half = 0.5 * ((angle - k * 6.283185307179586) - k * 2.4492935982947064e-16)
     z = half * half
-    p = 1 / 6227020800 - z / 1307674368000
+    p = 1 / 1307674368000 - z / 355687428096000
+    p = 1 / 6227020800 - z * p
     p = 1 / 39916800 - z * p
     p = 1 / 362880 - z * p
     p = 1 / 5040 - z * p
     p = 1 / 120 - z * p
     p = 1 / 6 - z * p
     sine = half * (1.0 - z * p)
-    p = 1 / 87178291200 - z / 20922789888000
+    p = 1 / 20922789888000 - z / 6402373705728000
+    p = 1 / 87178291200 - z * p
     p = 1 / 479001600 - z * p
     p = 1 / 3628800 - z * p
     p = 1 / 40320 - z * p

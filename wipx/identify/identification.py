@@ -19,6 +19,7 @@ from wipx.identify.problem import WindowProblem
 from wipx.sim.analytic import AnalyticSimulator, StateFeedback
 
 AT_BOUND = 1e-4  # of the search interval
+WORSE = 1.01  # ratio of errors from which a model is called worse
 UNEVEN = 1.5  # ratio of the signals' errors from which their weights are set anew
 
 
@@ -204,7 +205,7 @@ def _notes(
         notes += [
             f"{name}: the completed model predicts held-out recordings worse than the nominal one"
             for name in held_out.completed
-            if held_out.completed[name] > held_out.nominal[name]
+            if held_out.completed[name] > WORSE * held_out.nominal[name]
         ]
     if minimum.failed:
         notes.append(f"{minimum.failed} of {minimum.history.evaluations[-1]} candidates fell over entirely.")

@@ -6,7 +6,7 @@ Mayne 2003). It therefore belongs to each candidate model: friction, lag and del
 by the time the prediction starts.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,12 +14,15 @@ import numpy as np
 from wipx.core.model import ModelBatch
 from wipx.identify.windows import Windows
 from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.coefficients import coefficients
+from wipx.sim.rows import ON_FRICTION
 
 # The estimate first sees this much of a window [s]: an unstable plant is linear in its first
 # state only for a short time.
 REACHES = (0.1, 0.2, 0.4)
 STEPS = 6  # Levenberg-Marquardt steps on all known rows, at most
 SETTLED = 1e-3  # relative fall of the squared residuals below which a window is through
+SOFT = 0.03  # share of the joints' speeds over which dry friction builds up in a first estimate
 GUESS_SPAN = 0.08  # [s] of rows through which the first parabola goes
 FEWEST_ROWS = 4  # that a step sees in any case
 DIVERGED = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
@@ -98,14 +101,41 @@ class Predictor:
                 without them it starts from a parabola and sees more of each window by and by.
             floor: Whether to propagate the sensor noise too.
         """
-        state = self.first_guess(batch) if near is None else near
-        for reach in self._reaches() if near is None else ():
-            residuals, gain = self.state_gain(batch, state, reach)
-            state = state + self.correction(gain, residuals)
-        state, gain = self._settle(batch, state)
+        starts = self._approaches(batch) if near is None else [near]
+        settled = [self._settle(batch, start) for start in starts]
+        state, gain = settled[0].state, settled[0].gain
+        if len(settled) == 2:  # each window takes the better of both
+            first = settled[0].cost <= settled[1].cost
+            state = np.where(first, state, settled[1].state)
+            gain = StateGain(np.where(first, gain.slopes, settled[1].gain.slopes), gain.steps)
         rollouts = self.simulator.replay(batch, self.windows.inputs, state)
         spread = self._floor(batch, state, gain) if floor else None
         return Prediction(state, rollouts.coordinates, spread)
+
+    def _approaches(self, batch: ModelBatch) -> list[np.ndarray]:
+        """States to start from, having seen more and more of each window.
+
+        Where a joint can stick there are two: one as it is, one estimated with friction that
+        does not stick yet.
+        """
+        soft = self._softened
+        state = self.first_guess(batch)
+        for reach in self._reaches():
+            residuals, gain = soft.state_gain(batch, state, reach)
+            state = state + soft.correction(gain, residuals)
+        return [state, soft._settle(batch, state).state] if self._sticks(batch) else [state]
+
+    def _sticks(self, batch: ModelBatch) -> bool:
+        return not self.simulator.smoothing and bool(coefficients(batch).present[ON_FRICTION])
+
+    @cached_property
+    def _softened(self) -> "Predictor":
+        """The same, with friction that builds up over a share of the joints' speeds."""
+        if self.simulator.smoothing:
+            return self
+        joints = len(self.noise)
+        speeds = np.quantile(np.abs(self._parabola[joints:]), 0.95, axis=1)
+        return replace(self, simulator=replace(self.simulator, smoothing=tuple((SOFT * speeds).tolist())))
 
     def residuals(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Recorded minus predicted in standard deviations of the noise, zero outside of `rows`.
@@ -163,7 +193,7 @@ class Predictor:
         normal = normal + diagonal[..., None] * np.eye(normal.shape[-1])
         return -np.moveaxis(np.linalg.solve(normal, right[..., None])[..., 0], -1, 0)
 
-    def _settle(self, batch: ModelBatch, state: np.ndarray) -> tuple[np.ndarray, "StateGain"]:
+    def _settle(self, batch: ModelBatch, state: np.ndarray) -> "Settled":
         """Levenberg-Marquardt steps on all known rows; a window keeps the best state it had."""
         residuals, gain = self.state_gain(batch, state)
         cost = np.sum(residuals**2, axis=(0, 1))
@@ -181,7 +211,7 @@ class Predictor:
             damping = np.where(better, 0.1 * damping, np.maximum(10.0 * damping, 0.1))
             if np.all(settled):
                 break
-        return state, gain
+        return Settled(state, gain, cost)
 
     def known_residuals(self, batch: ModelBatch, state: np.ndarray) -> np.ndarray:
         """Residuals of the known rows at a state, shape (K' + 1, joints, P, R)."""
@@ -245,6 +275,21 @@ class StateGain:
         """
         product = np.einsum("akjpr,bkjpr->prab", self.slopes, self.slopes, optimize=True)
         return product + np.diag((1e-2 / self.steps) ** 2)
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Estimated states.
+
+    Attributes:
+        state: At each window's first row, shape (2 joints, P, R).
+        gain: Linearisation there.
+        cost: Squared residuals of the known rows, shape (P, R).
+    """
+
+    state: np.ndarray
+    gain: StateGain
+    cost: np.ndarray
 
 
 def _last_row(rows: np.ndarray) -> np.ndarray:

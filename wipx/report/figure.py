@@ -131,6 +131,7 @@ def _draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) ->
     axes.bar_label(bars, [significant(height) for height in heights], padding=2, fontsize=9)
     if wants_logarithm(finite):
         axes.set_yscale("log")
+        title = f"{title}, log scale"
     axes.margins(y=0.18)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)

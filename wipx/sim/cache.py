@@ -36,6 +36,6 @@ def _cache_folder() -> Path:
 def cached(function):
     """Compile a kernel, kept on disk for the next run."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        setattr(numba_settings, "CACHE_DIR", str(_cache_folder()))
+        numba_settings.CACHE_DIR = str(_cache_folder())
     flags = {"nsz", "arcp", "contract", "afn", "reassoc"}
     return numba.njit(fastmath=flags, error_model="numpy", nogil=True, cache=True, boundscheck=False)(function)

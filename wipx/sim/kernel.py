@@ -42,6 +42,7 @@ def _delayed_command(S, t_rows, u_rows, lanes, pointers, actuated):
     for w in range(W):
         h = S[R.STEP * W + w]
         if h <= 0.0:
+            S[R.DRIVE * W + w], S[R.DRIVE1 * W + w] = S[R.COMMAND * W + w], S[R.COMMAND1 * W + w]
             continue
         window, column = lanes[0, w], lanes[1, w]
         begin = S[R.TIME * W + w] - S[R.DELAY * W + w]
@@ -90,7 +91,7 @@ def _actuator(S, on, j):
         a = (R.LAGGED + j) * W
         for w in range(W):
             rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
-            S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w]
+            S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w] if S[R.STEP * W + w] > 0.0 else S[a + w]
             S[u + w] += rest * S[R.LAG_MEAN * W + w]
     if on[R.ON_RIPPLE]:
         for w in range(W):
@@ -245,8 +246,10 @@ def _smooth_friction(S, on, j):
                 S[(R.PAPER_VISCOUS + j) * W + w],
                 S[(R.PAPER_EPSILON + j) * W + w],
             )
-            rest = S[R.STARTED * W + w] * (S[(R.PAPER + j) * W + w] - steady)
-            S[(R.PAPER + j) * W + w] = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
+            before = S[(R.PAPER + j) * W + w]
+            rest = S[R.STARTED * W + w] * (before - steady)
+            after = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
+            S[(R.PAPER + j) * W + w] = after if S[R.STEP * W + w] > 0.0 else before
             S[(R.FORCE + j) * W + w] -= steady + rest * S[(R.PAPER_MEAN + j) * W + w]
 
 
@@ -288,7 +291,9 @@ def _move(S, on):
             before, after = S[(R.V + j) * W + w], S[(R.NEXT + j) * W + w]
             S[(R.Q + j) * W + w] = S[(R.MID + j) * W + w] + 0.5 * S[R.STEP * W + w] * after
             S[(R.V + j) * W + w] = after
-            S[(R.ACCELERATION + j) * W + w] = (after - before) * S[R.PER_STEP * W + w]
+            acceleration = (after - before) * S[R.PER_STEP * W + w]
+            last = S[(R.ACCELERATION + j) * W + w]
+            S[(R.ACCELERATION + j) * W + w] = acceleration if S[R.STEP * W + w] > 0.0 else last
             S[(R.RATE + j) * W + w] = 0.5 * (before + after)
         if on[R.ON_BRISTLE + j]:
             for w in range(W):
@@ -298,7 +303,7 @@ def _move(S, on):
 
 @law
 def _step(S, on, t_rows, u_rows, lanes, pointers, actuated):
-    """Advance every lane of the block by its step."""
+    """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit."""
     for j in range(2):
         for w in range(W):
             half = 0.5 * S[R.STEP * W + w]

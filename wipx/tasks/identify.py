@@ -45,7 +45,7 @@ class Identify:
         request = self._request(job, robot)
         objective: Objective = job.part("objective")
         optimizer = job.part("optimizer")
-        with SearchProgress(optimizer.seconds) as progress:
+        with SearchProgress() as progress:
             found = identify(
                 request,
                 split,

@@ -5,31 +5,32 @@ from types import TracebackType
 
 from tqdm import tqdm
 
+from wipx.identify.optimizers.search import Progress
+
 
 class SearchProgress:
-    """A bar over the budget of a search; used as its watcher.
+    """A bar over the parts of a search; used as its watcher.
 
-    The bar shows the time left of the budget; most searches converge before it is used up.
+    A search that is made once more, with other weights, begins the bar anew.
     """
 
-    def __init__(self, seconds: float, label: str = "identify") -> None:
+    def __init__(self, label: str = "identify") -> None:
         self._bar = tqdm(
-            total=round(seconds, 1),
+            total=100,
             desc=label,
-            unit="s",
-            bar_format="{desc}: {elapsed} of at most {total_fmt} s |{bar:20}| {postfix}",
+            bar_format="{desc} |{bar:24}| {percentage:3.0f} %, {elapsed} gone, about {remaining} left{postfix}",
             file=sys.stderr,
             leave=False,
             disable=None,
         )
 
-    def __call__(self, evaluations: int, seconds: float, best_loss: float) -> None:
+    def __call__(self, progress: Progress) -> None:
         """Show where the search is."""
-        self._bar.n = min(seconds, self._bar.total or seconds)
-        left = max((self._bar.total or 0.0) - seconds, 0.0)
-        self._bar.set_postfix_str(
-            f"{evaluations} evaluations, loss {best_loss:.4g}, at most {left:.0f} s left", refresh=False
-        )
+        done = min(int(100.0 * progress.share), 100)
+        if done < self._bar.n:
+            self._bar.reset()
+        self._bar.n = done
+        self._bar.set_postfix_str(f"loss {progress.best_loss:.4g}, {progress.evaluations} evaluations", refresh=False)
         self._bar.update(0)
 
     def __enter__(self) -> "SearchProgress":

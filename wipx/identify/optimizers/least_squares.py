@@ -64,6 +64,7 @@ class LeastSquares:
         """Follow the minimum from wide smoothing to none."""
         for level in self.smoothing:
             start = self._search(problem.smoothed(level), start, log)
+            log.share += 1.0 / (self.starts * len(self.smoothing))
             log.add(start[None], problem.losses(start[None]))
 
     def _search(self, problem: Problem, start: np.ndarray, log: Log) -> np.ndarray:

@@ -45,6 +45,7 @@ class ParticleSwarm:
 
         def losses(cube: np.ndarray) -> np.ndarray:
             values = problem.losses(cube)
+            log.share += 1.0 / self.iterations
             log.add(cube, values)
             return values
 

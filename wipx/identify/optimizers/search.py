@@ -17,12 +17,29 @@ class BudgetSpentError(Exception):
 class Watcher(Protocol):
     """Sees the progress of a search; raises KeyboardInterrupt to cancel it."""
 
-    def __call__(self, evaluations: int, seconds: float, best_loss: float) -> None:
+    def __call__(self, progress: "Progress") -> None:
         """Called after every batch of evaluations."""
         ...
 
 
-def unwatched(evaluations: int, seconds: float, best_loss: float) -> None:
+@dataclass(frozen=True)
+class Progress:
+    """Where a search is.
+
+    Attributes:
+        evaluations: Loss evaluations so far.
+        seconds: Time so far [s].
+        best_loss: Lowest loss so far.
+        share: Part of the search that is done, 0 to 1; later parts may be quicker or slower.
+    """
+
+    evaluations: int
+    seconds: float
+    best_loss: float
+    share: float
+
+
+def unwatched(progress: Progress) -> None:
     """A watcher that looks away."""
 
 
@@ -60,12 +77,14 @@ class Log:
         evaluations: Budget.
         seconds: Budget [s].
         watcher: Told of every batch.
+        share: Part of the search that is done; the optimizer keeps it.
     """
 
     optimizer: str
     evaluations: int
     seconds: float
     watcher: Watcher
+    share: float = 0.0
     began: float = field(default_factory=time.monotonic)
     count: int = 0
     failed: int = 0
@@ -95,7 +114,7 @@ class Log:
         self.count += evaluations
         spent = time.monotonic() - self.began
         self.course.append((self.count, spent, self.best_loss))
-        self.watcher(self.count, spent, self.best_loss)
+        self.watcher(Progress(self.count, spent, self.best_loss, self.share))
         if self.count >= self.evaluations or spent >= self.seconds:
             raise BudgetSpentError
 

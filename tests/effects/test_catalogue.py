@@ -1,0 +1,147 @@
+"""The catalogue holds the vocabulary of contract section 3, and every effect says what it is."""
+
+import pytest
+
+from wipx.core.effect import Effect
+from wipx.core.errors import InputError
+from wipx.core.plant import PLANTS, plant_of
+from wipx.effects.catalogue import check_together, effect_of, kinds, vocabulary
+
+# Contract section 3: kind, sites on a wip, parameters that the contract names.
+CONTRACT = (
+    ("viscous", ("translation", "pitch"), {"sigma"}),
+    ("coulomb", ("translation", "pitch"), {"F_c"}),
+    ("stribeck", ("translation", "pitch"), {"F_s", "F_c", "v_s"}),
+    ("presliding", ("translation", "pitch"), {"stiffness", "F_c"}),
+    ("quadratic_drag", ("translation", "pitch"), {"c"}),
+    ("sticky_spot", ("translation",), {"F_c", "lo", "hi"}),
+    ("gain", ("actuator",), {"k"}),
+    ("dead_zone", ("actuator",), {"band"}),
+    ("delay", ("actuator", "sensor_x", "sensor_theta"), {"tau"}),
+    ("lag", ("actuator",), {"tau"}),
+    ("saturation", ("actuator",), {"F_max"}),
+    ("speed_limit", ("actuator",), {"F_stall", "v_free"}),
+    ("backlash", ("actuator",), {"gap"}),
+    ("ripple", ("actuator",), {"A", "n", "phase"}),
+    ("payload", ("geometry",), {"mass", "height"}),
+    ("payload_event", ("geometry",), {"mass", "height", "t0"}),
+    ("com_offset", ("geometry",), {"theta_eq"}),
+    ("inertia", ("geometry",), {"scale"}),
+    ("rail_tilt", ("environment",), {"angle"}),
+    ("spring", ("environment",), {"k", "x0"}),
+    ("bias", ("sensor_theta",), {"b"}),
+    ("scale", ("sensor_x", "sensor_theta"), {"e"}),
+)
+ALL = sorted(kinds())
+
+
+@pytest.mark.parametrize(("kind", "sites", "parameters"), CONTRACT, ids=[row[0] for row in CONTRACT])
+def test_the_vocabulary_of_the_contract_is_there(kind: str, sites: tuple[str, ...], parameters: set[str]):
+    known = vocabulary(plant_of("wip"))
+    assert {name for name in known if name.endswith(f"/{kind}")} == {f"{site}/{kind}" for site in sites}
+    assert parameters <= {p.name for p in kinds()[kind].parameters}
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_every_effect_says_what_it_is(kind: str):
+    effect = kinds()[kind]
+    assert effect.kind == kind
+    assert effect.law
+    assert effect.source
+    assert effect.sites
+    assert effect.parameters
+    assert set(effect.excludes) <= set(ALL)
+    names = [p.name for p in effect.parameters]
+    assert len(set(names)) == len(names)
+    assert effect.neutral.keys() == set(names)
+    for p in effect.parameters:
+        assert p.meaning
+        assert p.low < p.high
+        assert p.low <= p.start <= p.high
+
+
+def test_every_kind_is_defined_once():
+    assert len({effect.law for effect in kinds().values()}) == len(ALL)
+
+
+def test_units_follow_the_joint():
+    F_c = kinds()["coulomb"].parameters[0]
+    assert (F_c.unit(angular=False), F_c.unit(angular=True)) == ("N", "N m")
+    sigma = kinds()["viscous"].parameters[0]
+    assert (sigma.unit(angular=False), sigma.unit(angular=True)) == ("N s/m", "N m s/rad")
+    wip, pendulum = PLANTS["wip"], PLANTS["pendulum"]
+    assert wip.is_angular("pitch")
+    assert not wip.is_angular("translation")
+    assert not wip.is_angular("actuator")
+    assert pendulum.is_angular("actuator")
+    assert wip.is_angular("sensor_theta")
+    assert not wip.is_angular("sensor_x")
+
+
+@pytest.mark.parametrize(
+    ("plant", "has", "lacks"),
+    [
+        (
+            "pendulum",
+            {"pitch/coulomb", "geometry/payload", "sensor_theta/bias"},
+            {"translation/coulomb", "environment/spring"},
+        ),
+        (
+            "linear_axis",
+            {"translation/sticky_spot", "environment/rail_tilt"},
+            {"geometry/com_offset", "geometry/inertia"},
+        ),
+        (
+            "double_pendulum",
+            {"joint1/stribeck", "joint2/lugre", "sensor_theta2/delay"},
+            {"geometry/payload", "joint1/sticky_spot"},
+        ),
+    ],
+)
+def test_a_plant_has_the_effects_that_mean_something_there(plant: str, has: set[str], lacks: set[str]):
+    known = set(vocabulary(PLANTS[plant]))
+    assert has <= known
+    assert not lacks & known
+    assert {name.partition("/")[0] for name in known} <= set(PLANTS[plant].sites)
+
+
+def test_an_unknown_effect_lists_the_valid_ones():
+    with pytest.raises(InputError) as caught:
+        effect_of("translation/colomb", plant_of("wip"), "robot.yaml: effects")
+    message = str(caught.value)
+    assert message.startswith("robot.yaml: effects: ")
+    assert "did you mean translation/coulomb?" in message
+    assert all(name in message for name in vocabulary(plant_of("wip")))
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("pitch/stribeck", "pitch/coulomb"),
+        ("pitch/coulomb", "pitch/stribeck"),
+        ("pitch/presliding", "pitch/lugre"),
+        ("translation/lagged_stribeck", "translation/viscous"),
+        ("translation/coulomb", "translation/asymmetric_coulomb"),
+    ],
+)
+def test_two_names_for_one_friction_at_a_joint_are_refused(names: tuple[str, ...]):
+    with pytest.raises(InputError, match="describe the same friction; keep one of them"):
+        check_together(names, plant_of("wip"))
+
+
+def test_friction_at_different_joints_and_different_physics_at_one_go_together():
+    names = (
+        "pitch/stribeck",
+        "translation/coulomb",
+        "translation/viscous",
+        "translation/sticky_spot",
+        "actuator/delay",
+    )
+    check_together(names, plant_of("wip"))
+
+
+def test_neutral_values_are_by_name():
+    assert isinstance(kinds()["gain"], Effect)
+    assert kinds()["gain"].neutral == {"k": 1.0}
+    assert kinds()["delay"].neutral == {"tau": 0.0}
