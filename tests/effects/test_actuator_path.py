@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sim.robots import Effects, move, robot, row_forces, sines, unit_axis
 
-from wipx.core.parameters import UNITS
 from wipx.effects import speed_limit
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -55,7 +54,7 @@ def test_delay_commutes_with_a_shift_of_time():
     np.testing.assert_allclose(later.q, now.q, atol=1e-11)  # round-off of times
 
 
-def test_delay_takes_history_from_rows_before_the_start_and_uneven_rows_as_they_are():
+def test_delay_takes_uneven_rows_as_they_are():
     rng = np.random.default_rng(3)
     t = np.concatenate([[0.0], np.cumsum(rng.uniform(1e-3, 4e-3, 250))])
     held = forces_of({"actuator/delay": {"tau": 0.011}}, RANDOM, t=t)
@@ -220,7 +219,3 @@ def test_actuator_effects_act_on_every_driven_joint():
     weak = move(robot("double_pendulum", {"actuator/gain": {"k": 0.5}}), np.zeros(4), t, commands)
     half = move(robot("double_pendulum"), np.zeros(4), t, 0.5 * commands)
     np.testing.assert_array_equal(weak.q, half.q)
-
-
-def test_every_dimension_has_units_for_both_kinds_of_joint():
-    assert all(len(units) == 2 for units in UNITS.values())

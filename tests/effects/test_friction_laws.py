@@ -92,7 +92,7 @@ def test_a_bristle_remembers_where_it_was_bent():
     assert x == pytest.approx(-0.01 * np.log(1.0 - 0.8), rel=2e-3)  # settles as exp(-20 s * 20/50)
 
 
-def test_a_bristle_creeps_through_the_notch_of_its_memory_and_stays_bent_after():
+def test_a_released_bristle_springs_back_by_less_than_it_went():
     model = robot(
         "linear_axis",
         {"translation/presliding": {"F_c": 1.0, "stiffness": 100.0}, "translation/viscous": {"sigma": 50.0}},

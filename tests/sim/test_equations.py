@@ -54,7 +54,7 @@ def test_fresh_starts_and_commands_agree_with_the_equations(kind: str, fresh_see
     commands = STRENGTH[kind] * rng.normal(size=(50, len(DRIVEN[kind])))
     exact = reference(robot(kind), initial, t, commanded(kind, commands))
     # At a jump of the command the rate in mid-step is predicted h/2 * jump too far: white commands are the worst case.
-    assert distance(move(robot(kind), initial, t, commands, AnalyticSimulator(2e-4)), exact) < 1e-3
+    assert distance(move(robot(kind), initial, t, commands, AnalyticSimulator(2e-4)), exact) < 5e-4
 
 
 def smooth_wip(commands: np.ndarray, exact_lag: np.ndarray) -> Forces:
@@ -92,17 +92,18 @@ def test_smooth_effects_together_converge_at_second_order():
     assert_second_order(coarse, fine, at_most=5e-4)
 
 
-@pytest.mark.parametrize("sigma", [0.5, 50.0, 5000.0])
-def test_viscous_friction_decays_as_the_exponential_however_strong(sigma: float):
-    model = robot("linear_axis", {"translation/viscous": {"sigma": sigma}})
-    t = np.linspace(0.0, 0.1, 101)
-    v = move(model, (0.0, 1.0), t).v[:, 0]
-    rate = sigma / 2.5
-    if rate * 1e-3 < 0.1:
-        # Implicit in the mean rate: relative error rate^3 h^2 t / 12.
-        np.testing.assert_allclose(v, np.exp(-rate * t), atol=rate**2 * 1e-6 / 12.0 + 1e-12)
-    assert np.all(np.abs(np.diff(np.abs(v))) <= 1.0)
-    assert abs(v[-1]) <= 1.0 + 1e-12  # stable where rate * h = 2
+def test_viscous_friction_decays_exponentially():
+    t = np.linspace(0.0, 0.5, 101)
+    for sigma in (0.5, 50.0):
+        v = move(robot("linear_axis", {"translation/viscous": {"sigma": sigma}}), (0.0, 1.0), t).v[:, 0]
+        rate = sigma / 2.5
+        # Implicit in the mean rate: the exponent is off by the share (rate h)^2 / 12, and y exp(-y) < 0.37.
+        np.testing.assert_allclose(v, np.exp(-rate * t), atol=0.37 * (rate * 1e-3) ** 2 / 12.0 + 1e-12)
+
+
+def test_viscous_friction_is_stable_however_strong():
+    v = move(robot("linear_axis", {"translation/viscous": {"sigma": 1e6}}), (0.0, 1.0), ONE_SECOND).v
+    assert np.all(np.diff(np.abs(v[:, 0])) <= 0.0)
 
 
 def test_positive_theta_moves_the_centre_of_mass_to_minus_x():
@@ -125,13 +126,12 @@ def test_positive_command_drives_to_plus_x_and_leans_the_body_to_positive_theta(
 
 @pytest.mark.parametrize("kind", ["wip", "cartpole", "pendulum"])
 def test_upright_is_an_unstable_and_hanging_a_stable_equilibrium(kind: str):
-    joints = len(LIVELY[kind]) // 2
-    for angle, grows in ((1e-3, True), (np.pi + 1e-3, False)):
-        start = np.zeros(2 * joints)
-        start[joints - 1] = angle
-        reach = np.max(np.abs(move(robot(kind), start, ONE_SECOND).q[:, -1] - round(angle)))
-        assert (np.max(np.abs(move(robot(kind), start, ONE_SECOND).q[:, -1] - (angle - 1e-3))) > 0.01) == grows
-        assert reach < 4.0
+    start = np.zeros(len(LIVELY[kind]))
+    pitch = len(start) // 2 - 1
+    for rest, stable in ((0.0, False), (np.pi, True)):
+        start[pitch] = rest + 1e-3
+        away = np.abs(move(robot(kind), start, ONE_SECOND).q[:, -1] - rest)
+        assert (np.max(away) < 1.01e-3) == stable
 
 
 def test_double_pendulum_hangs_at_zero_and_counts_its_second_angle_from_link_1():

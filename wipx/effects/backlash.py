@@ -1,7 +1,8 @@
 """Backlash: the drive crosses a gap before it pushes the other way.
 
 The free drive is a small mass that the force accelerates; contact is inelastic. The drive's
-own momentum is not handed to the wheel, being small.
+own momentum is not handed to the wheel, being small; a free drive as heavy as what it drives
+is outside this law: it would lose contact to the acceleration that it causes itself.
 """
 
 from wipx.core.effect import Effect

@@ -17,7 +17,8 @@ from wipx.core.plant import Plant
 from wipx.sim import rows as R
 from wipx.sim.coefficients import coefficients, joint_index
 from wipx.sim.inputs import Inputs
-from wipx.sim.kernel import W, rollout
+from wipx.sim.kernel import rollout
+from wipx.sim.rows import W
 
 LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
 NO_FEEDBACK = np.zeros((1, 4, 1))

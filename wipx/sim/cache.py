@@ -8,6 +8,7 @@ import hashlib
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numba
 from numba.core import config as numba_settings
@@ -36,6 +37,7 @@ def _cache_folder() -> Path:
 def cached(function):
     """Compile a kernel, kept on disk for the next run."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        numba_settings.CACHE_DIR = str(_cache_folder())
+        settings: Any = numba_settings  # its names are made at run time
+        settings.CACHE_DIR = str(_cache_folder())
     flags = {"nsz", "arcp", "contract", "afn", "reassoc"}
     return numba.njit(fastmath=flags, error_model="numpy", nogil=True, cache=True, boundscheck=False)(function)

@@ -4,6 +4,8 @@ One rollout is one column ("lane"). A pair of rows `X, X1` belongs to joints 0 a
 the commands that act on them).
 """
 
+W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instead of unrolling it
+
 # Coefficients of a model, constant during a rollout (filled by `coefficients`).
 (
     MASS, COUPLING, INERTIA, GRAVITY,  # wip family: M11, m_b L, M22, m_b g L

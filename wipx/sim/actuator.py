@@ -1,0 +1,102 @@
+"""The path from the command to the force on a joint, in causal order; compiled.
+
+Delay, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash. Every part is
+a loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
+"""
+
+from wipx.core.law import clip, inlined, law, sign, sin_cos
+from wipx.effects import backlash as backlash_law
+from wipx.effects import dead_zone, speed_limit
+from wipx.sim import rows as R
+from wipx.sim.rows import W
+
+
+@law
+def delayed_command(S, t_rows, u_rows, lanes, pointers, actuated):
+    """The mean command over the step, after the transport delay (scalar: every lane has its own past)."""
+    last = t_rows.shape[0] - 2
+    for w in range(W):
+        h = S[R.STEP * W + w]
+        if h <= 0.0:
+            S[R.DRIVE * W + w], S[R.DRIVE1 * W + w] = S[R.COMMAND * W + w], S[R.COMMAND1 * W + w]
+            continue
+        window, column = lanes[0, w], lanes[1, w]
+        begin = S[R.TIME * W + w] - S[R.DELAY * W + w]
+        end = begin + h
+        k = pointers[w]
+        while k < last and t_rows[k + 1, window] <= begin:
+            k += 1
+        pointers[w] = k
+        for j in range(2):
+            if not actuated[j]:
+                continue
+            total = 0.0
+            done = begin
+            i = k
+            while i < last and t_rows[i + 1, window] < end:
+                total += (t_rows[i + 1, window] - done) * u_rows[i, j, column]
+                done = t_rows[i + 1, window]
+                i += 1
+            total += (end - done) * u_rows[i, j, column]
+            S[(R.DRIVE + j) * W + w] = total / h * S[R.INPUT_GAIN * W + w]
+
+
+@inlined
+def actuator_path(S, on, j):
+    """From the command of joint j to the force on it."""
+    u = (R.DRIVE + j) * W
+    v = (R.RATE + j) * W
+    if on[R.ON_OFFSET]:
+        for w in range(W):
+            S[u + w] += S[R.OFFSET * W + w]
+    if on[R.ON_DEAD_ZONE]:
+        for w in range(W):
+            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w])
+    for w in range(W):
+        S[u + w] *= S[R.GAIN * W + w]
+    if on[R.ON_SATURATION]:
+        for w in range(W):
+            S[u + w] = clip(S[u + w], -S[R.FORCE_MAX * W + w], S[R.FORCE_MAX * W + w])
+    if on[R.ON_SPEED_LIMIT]:
+        for w in range(W):
+            S[u + w] = speed_limit.limited(S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w])
+    if on[R.ON_BACK_EMF]:
+        for w in range(W):
+            S[u + w] -= S[R.BACK_EMF * W + w] * S[v + w]
+    if on[R.ON_LAG]:
+        a = (R.LAGGED + j) * W
+        for w in range(W):
+            rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
+            S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w] if S[R.STEP * W + w] > 0.0 else S[a + w]
+            S[u + w] += rest * S[R.LAG_MEAN * W + w]
+    if on[R.ON_RIPPLE]:
+        for w in range(W):
+            angle = S[R.RIPPLE_PERIODS * W + w] * S[(R.MID + j) * W + w] + S[R.RIPPLE_PHASE * W + w]
+            _, cosine = sin_cos(angle)
+            S[u + w] += S[R.RIPPLE * W + w] * cosine
+    if on[R.ON_BACKLASH]:
+        backlash(S, j)
+
+
+@inlined
+def backlash(S, j):
+    """Pass on the force of joint j where its drive is in contact."""
+    for w in range(W):
+        h = S[R.STEP * W + w]
+        force = S[(R.DRIVE + j) * W + w]
+        gap = S[R.GAP * W + w]
+        begun = S[R.STARTED * W + w] > 0.0
+        before = S[(R.PLACE + j) * W + w] if begun else 0.5 * gap * sign(force)
+        moved, rate, share = backlash_law.cross(
+            before,
+            S[(R.DRIVE_SPEED + j) * W + w],
+            force,
+            S[(R.ACCELERATION + j) * W + w],
+            gap,
+            S[R.DRIVE_INERTIA * W + w],
+            h,
+        )
+        S[(R.PLACE + j) * W + w] = moved
+        S[(R.DRIVE_SPEED + j) * W + w] = rate
+        pushes = share if moved * force > 0.0 else 0.0
+        S[(R.DRIVE + j) * W + w] = force * (pushes if gap > 0.0 else 1.0)

@@ -1,0 +1,127 @@
+"""Friction of the joints, and the motion that follows; compiled.
+
+Dry friction is set-valued: the friction impulses p of the two joints solve
+
+    v' = b + W p,   p_i in [-h F+_i, h F-_i],   v'_i = 0 inside, p_i at an end otherwise
+
+exactly, so that a joint sticks and is not smoothed (Moreau's time stepping; Acary and
+Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, ch. 10).
+"""
+
+from wipx.core.law import clip, inlined, law, maximum
+from wipx.effects import lagged_stribeck, load_friction, quadratic_drag, sticky_spot, stribeck
+from wipx.effects.presliding import bristle, bristle_rate
+from wipx.sim import rows as R
+from wipx.sim.rows import W
+
+
+@inlined
+def levels(S, on, j):
+    """Dry friction of joint j: the impulse may lie anywhere up to these levels."""
+    v = (R.RATE + j) * W
+    if on[R.ON_STRIBECK + j]:
+        for w in range(W):
+            static, coulomb = S[(R.STATIC + j) * W + w], S[(R.COULOMB + j) * W + w]
+            more = stribeck.bump(S[v + w], static, coulomb, S[(R.STRIBECK_SPEED + j) * W + w])
+            S[(R.PLUS + j) * W + w] += more
+            S[(R.MINUS + j) * W + w] += more
+    if on[R.ON_LOAD + j]:
+        for w in range(W):
+            motor = S[(R.DRIVE + j) * W + w]
+            load = S[(R.FORCE + j) * W + w] - motor
+            more = load_friction.level(motor, load, S[(R.LOAD_MOTOR + j) * W + w], S[(R.LOAD_EXTERNAL + j) * W + w])
+            S[(R.PLUS + j) * W + w] += more
+            S[(R.MINUS + j) * W + w] += more
+    if on[R.ON_SPOT] and j == 0:
+        for w in range(W):
+            now = S[R.Q * W + w]
+            there = now + S[R.STEP * W + w] * S[v + w]
+            more = S[R.SPOT * W + w] * sticky_spot.share(now, there, S[R.SPOT_LOW * W + w], S[R.SPOT_HIGH * W + w])
+            S[R.PLUS * W + w] += more
+            S[R.MINUS * W + w] += more
+
+
+@inlined
+def smooth_friction(S, on, j):
+    """Friction of joint j that is a force: drag, bristle, the paper's lagged law."""
+    v = (R.RATE + j) * W
+    if on[R.ON_DRAG + j]:
+        for w in range(W):
+            S[(R.FORCE + j) * W + w] += quadratic_drag.force(S[v + w], S[(R.DRAG + j) * W + w])
+    if on[R.ON_BRISTLE + j]:
+        for w in range(W):
+            sliding, speed = S[(R.SLIDING + j) * W + w], abs(S[v + w])
+            level = sliding + stribeck.bump(speed, S[(R.PEAK + j) * W + w], sliding, S[(R.PEAK_SPEED + j) * W + w])
+            stiffness, damping = S[(R.BRISTLE + j) * W + w], S[(R.BRISTLE_DAMPING + j) * W + w]
+            rate = bristle_rate(speed, stiffness, level)
+            h = S[R.STEP * W + w]
+            z = S[(R.Z + j) * W + w]
+            kept, gain, mean_gain = bristle(rate * h)
+            # The force is linear in the mean rate of the step, which is solved for below.
+            S[(R.FORCE + j) * W + w] -= (stiffness - damping * rate) * gain * z
+            S[(R.DAMPING + j) * W + w] += stiffness * mean_gain * h + damping * gain
+            S[(R.BRISTLE_KEPT + j) * W + w] = kept
+            S[(R.BRISTLE_GAIN + j) * W + w] = gain * h
+    if on[R.ON_PAPER + j]:
+        for w in range(W):
+            steady = lagged_stribeck.resistance(
+                S[v + w],
+                S[(R.PAPER_STATIC + j) * W + w],
+                S[(R.PAPER_COULOMB + j) * W + w],
+                S[(R.PAPER_SPEED + j) * W + w],
+                S[(R.PAPER_VISCOUS + j) * W + w],
+                S[(R.PAPER_EPSILON + j) * W + w],
+            )
+            before = S[(R.PAPER + j) * W + w]
+            rest = S[R.STARTED * W + w] * (before - steady)
+            after = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
+            S[(R.PAPER + j) * W + w] = after if S[R.STEP * W + w] > 0.0 else before
+            S[(R.FORCE + j) * W + w] -= steady + rest * S[(R.PAPER_MEAN + j) * W + w]
+
+
+@law
+def move(S, on):
+    """Solve for the rates at the end of the step, with sticking, and drift the second half."""
+    for w in range(W):
+        h = S[R.STEP * W + w]
+        v0, v1 = S[R.V * W + w], S[R.V1 * W + w]
+        d0, d1 = S[R.DAMPING * W + w], S[R.DAMPING1 * W + w]
+        a11 = S[R.M11 * W + w] + 0.5 * h * d0
+        a22 = S[R.M22 * W + w] + 0.5 * h * d1
+        a12 = S[R.M12 * W + w]
+        r0 = h * (S[R.FORCE * W + w] - d0 * v0)
+        r1 = h * (S[R.FORCE1 * W + w] - d1 * v1)
+        inverse = 1.0 / (a11 * a22 - a12 * a12)
+        S[R.W11 * W + w] = a22 * inverse
+        S[R.W12 * W + w] = -a12 * inverse
+        S[R.W22 * W + w] = a11 * inverse
+        S[R.NEXT * W + w] = v0 + (a22 * r0 - a12 * r1) * inverse
+        S[R.NEXT1 * W + w] = v1 + (a11 * r1 - a12 * r0) * inverse
+    if on[R.ON_FRICTION]:
+        for w in range(W):
+            h = S[R.STEP * W + w]
+            w11, w12, w22 = S[R.W11 * W + w], S[R.W12 * W + w], S[R.W22 * W + w]
+            b0, b1 = S[R.NEXT * W + w], S[R.NEXT1 * W + w]
+            low0, high0 = -h * S[R.PLUS * W + w], h * S[R.MINUS * W + w]
+            low1, high1 = -h * S[R.PLUS1 * W + w], h * S[R.MINUS1 * W + w]
+            # A joint that yields while it "sticks" (smoothing) is a compliance in series.
+            c11 = w11 + 2.0 * S[R.SMOOTHING * W + w] / maximum(high0 - low0, 1e-15)
+            c22 = w22 + 2.0 * S[R.SMOOTHING1 * W + w] / maximum(high1 - low1, 1e-15)
+            both_stick = (w12 * b0 - c11 * b1) / (c11 * c22 - w12 * w12)
+            p0 = clip(-(b0 + w12 * clip(both_stick, low1, high1)) / c11, low0, high0)
+            p1 = clip(-(b1 + w12 * p0) / c22, low1, high1)
+            S[R.NEXT * W + w] = b0 + w11 * p0 + w12 * p1
+            S[R.NEXT1 * W + w] = b1 + w12 * p0 + w22 * p1
+    for j in range(2):
+        for w in range(W):
+            before, after = S[(R.V + j) * W + w], S[(R.NEXT + j) * W + w]
+            S[(R.Q + j) * W + w] = S[(R.MID + j) * W + w] + 0.5 * S[R.STEP * W + w] * after
+            S[(R.V + j) * W + w] = after
+            acceleration = (after - before) * S[R.PER_STEP * W + w]
+            last = S[(R.ACCELERATION + j) * W + w]
+            S[(R.ACCELERATION + j) * W + w] = acceleration if S[R.STEP * W + w] > 0.0 else last
+            S[(R.RATE + j) * W + w] = 0.5 * (before + after)
+        if on[R.ON_BRISTLE + j]:
+            for w in range(W):
+                z, mean = S[(R.Z + j) * W + w], S[(R.RATE + j) * W + w]
+                S[(R.Z + j) * W + w] = S[(R.BRISTLE_KEPT + j) * W + w] * z + S[(R.BRISTLE_GAIN + j) * W + w] * mean

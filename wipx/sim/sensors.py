@@ -1,0 +1,80 @@
+"""What the sensors show at a row of the log, and the feedback computed from it; compiled."""
+
+from wipx.core.law import clip, law, maximum, minimum
+from wipx.sim import rows as R
+from wipx.sim.rows import W
+
+
+@law
+def interpolate(past, t_rows, window, k, j, lane, moment):
+    """Coordinate j at a `moment` up to row k: cubic Hermite between rows; held before the first."""
+    i = k - 1
+    while i > 0 and t_rows[i, window] > moment:
+        i -= 1
+    if i < 0:
+        return past[0, j, lane]
+    h = t_rows[i + 1, window] - t_rows[i, window]
+    if h <= 0.0:
+        return past[i + 1, j, lane]
+    x = minimum(maximum((moment - t_rows[i, window]) / h, 0.0), 1.0)
+    a, b = past[i, j, lane], past[i + 1, j, lane]
+    da, db = h * past[i, 2 + j, lane], h * past[i + 1, 2 + j, lane]
+    c = b - a
+    return a + x * (da + x * ((3.0 * c - 2.0 * da - db) + x * (da + db - 2.0 * c)))
+
+
+@law
+def record(S, on, past, t_rows, lanes, k, out, lane0, count):
+    """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
+    for j in range(2):
+        for w in range(W):
+            true = S[(R.Q + j) * W + w]
+            S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * true + S[(R.BIAS + j) * W + w]
+    if on[R.ON_SENSOR_DELAY]:
+        for j in range(2):
+            for w in range(count):
+                past[k, j, lane0 + w] = S[(R.Q + j) * W + w]
+                past[k, 2 + j, lane0 + w] = S[(R.V + j) * W + w]
+                moment = t_rows[k, lanes[0, w]] - S[(R.SENSOR_DELAY + j) * W + w]
+                late = interpolate(past, t_rows, lanes[0, w], k, j, lane0 + w, moment)
+                S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * late + S[(R.BIAS + j) * W + w]
+    for j in range(2):
+        out[k, j, lane0 : lane0 + count] = S[(R.SHOWN + j) * W : (R.SHOWN + j) * W + count]
+        out[k, 2 + j, lane0 : lane0 + count] = S[(R.V + j) * W : (R.V + j) * W + count]
+
+
+@law
+def feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
+    """State feedback u = -K (y - y_ref) on what the sensors show, at the rows of the log."""
+    smoothing, limit = settings[0], settings[1]
+    for i in range(4):
+        S[(R.NOISE + i) * W : (R.NOISE + i) * W + count] = noise[k, i, lane0 : lane0 + count]
+        reference = references[k, i]
+        for w in range(W):
+            S[(R.REFERENCE + i) * W + w] = reference[lanes[0, w]]
+    if smoothing >= 0.0:  # rates from differences of the coordinates, through a low-pass
+        for w in range(W):
+            window = lanes[0, w]
+            S[R.TIME * W + w] = t_rows[k, window] - t_rows[max(k, 1) - 1, window]
+    for j in range(2):
+        if smoothing < 0.0:
+            for w in range(W):
+                S[(R.MEASURED_RATE + j) * W + w] = S[(R.V + j) * W + w] + S[(R.NOISE_RATE + j) * W + w]
+        else:
+            for w in range(W):
+                dt = S[R.TIME * W + w]
+                moved = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w] - S[(R.MEASURED + j) * W + w]
+                rate = S[(R.MEASURED_RATE + j) * W + w]
+                filtered = rate + (moved - rate * dt) / (dt + smoothing)
+                S[(R.MEASURED_RATE + j) * W + w] = filtered if k > 0 else 0.0
+        for w in range(W):
+            S[(R.MEASURED + j) * W + w] = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w]
+    for c in range(2):
+        k0, k1, k2, k3 = gains[c, 0], gains[c, 1], gains[c, 2], gains[c, 3]
+        for w in range(W):
+            u = -k0 * (S[R.MEASURED * W + w] - S[R.REFERENCE * W + w])
+            u -= k1 * (S[R.MEASURED1 * W + w] - S[R.REFERENCE1 * W + w])
+            u -= k2 * (S[R.MEASURED_RATE * W + w] - S[R.REFERENCE_RATE * W + w])
+            u -= k3 * (S[R.MEASURED_RATE1 * W + w] - S[R.REFERENCE_RATE1 * W + w])
+            S[(R.COMMAND + c) * W + w] = clip(u, -limit, limit)
+        u_rows[k, c, lane0 : lane0 + count] = S[(R.COMMAND + c) * W : (R.COMMAND + c) * W + count]
