@@ -61,7 +61,7 @@ class RunConfig:
     seed: int = 0
     effects: list[str] = field(default_factory=list)
     free: dict[str, Any] = field(default_factory=dict)
-    bounds: dict[str, list[float]] = field(default_factory=dict)
+    bounds: dict[str, Any] = field(default_factory=dict)
     model: ModelConfig = field(default_factory=ModelConfig)
     task: Any = None
     recordings: Any = None

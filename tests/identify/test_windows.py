@@ -112,8 +112,8 @@ def test_recordings_keep_their_own_time(recording: Recording):
     windows = contract_windows(recording, moved)
     np.testing.assert_array_equal(windows.recording, np.repeat([0, 1], 5))
     np.testing.assert_allclose(windows.starts[5:], windows.starts[:5] + 100.0)
-    # Rounding of t reaches 1e-7 rad where the joint sticks.
-    np.testing.assert_allclose(predicted(moved), predicted(recording), atol=1e-6)
+    # The rounding of t may end an estimate of the state one step earlier or later.
+    np.testing.assert_allclose(predicted(moved), predicted(recording), atol=0.1 * ANGLE_NOISE)
 
 
 def test_a_recording_shorter_than_a_window_is_refused_in_one_line(recording: Recording):

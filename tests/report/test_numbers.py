@@ -44,8 +44,13 @@ def test_interval_of_a_tiny_number_shares_one_exponent():
 
 
 def test_interval_around_zero_has_no_negative_zero():
+    shown = with_interval(0.05, -0.0001, 0.2)
+    assert (shown.value, shown.ends) == ("0.05", "[0.00, 0.20]")
+
+
+def test_an_interval_far_wider_than_the_value_does_not_hide_it():
     shown = with_interval(-0.001, -0.2, 0.2)
-    assert (shown.value, shown.ends) == ("0.00", "[-0.20, 0.20]")
+    assert (shown.value, shown.ends) == ("-0.0010", "[-0.20, 0.20]")
 
 
 def test_interval_of_no_width_keeps_the_value():

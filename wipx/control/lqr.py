@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.control.linearise import linearise
-from wipx.core.errors import InputError
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.sim.analytic import StateFeedback
 
@@ -30,6 +30,9 @@ class Lqr:
     rate: float = 650.0
     rate_filter: float | None = 0.005
     limit: float = 100.0
+
+    def __post_init__(self) -> None:
+        check_positive(command=self.command, rate=self.rate, limit=self.limit)
 
     def feedback(self, model: Model) -> StateFeedback:
         """The gains for a model's rigid body.

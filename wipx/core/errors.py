@@ -26,3 +26,17 @@ def unknown_name(what: str, name: object, valid: Iterable[str], where: str = "")
     hint = f"; did you mean {close[0]}?" if close else ";"
     place = f"{where}: " if where else ""
     return InputError(f"{place}unknown {what} {name!r}{hint} valid: {', '.join(options)}")
+
+
+def check_positive(**settings: float) -> None:
+    """Refuse settings that are not positive.
+
+    Args:
+        settings: Values by the name that a user sees.
+
+    Raises:
+        InputError: the first one that is zero, negative or not a number.
+    """
+    for name, value in settings.items():
+        if not value > 0:
+            raise InputError(f"{name} is {value:g}, expected a positive number")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.core.errors import InputError
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
@@ -55,6 +55,11 @@ class EmulatedTestbed:
     position_step: float = 5e-5
     angle_noise: float = 4e-4
     step: float = 2e-4
+
+    def __post_init__(self) -> None:
+        check_positive(
+            duration=self.duration, log_every=self.log_every, position_step=self.position_step, step=self.step
+        )
 
     def nominal(self) -> Model:
         """The robot as its owner believes it to be."""

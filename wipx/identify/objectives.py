@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from wipx.core.errors import InputError
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.identify.closed_loop import ClosedLoopProblem
@@ -62,6 +62,9 @@ class Windowed:
     horizon: float = 0.5
     lead: float = 0.3
 
+    def __post_init__(self) -> None:
+        check_positive(horizon=self.horizon, lead=self.lead)
+
     def problem(self, data: FitData, space: ParameterSpace) -> WindowProblem:
         """Errors of all windows of the recordings."""
         windows = cut(data.recordings, data.model.plant, horizon=self.horizon, lead=self.lead)
@@ -84,6 +87,9 @@ class MultiStep:
     """
 
     horizon: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_positive(horizon=self.horizon)
 
     def problem(self, data: FitData, space: ParameterSpace) -> WindowProblem:
         """Errors of all windows of the recordings."""
@@ -109,6 +115,9 @@ class PaperTrajectories:
     samples: int = 80
     period: float = 0.015
     classes: str = ""
+
+    def __post_init__(self) -> None:
+        check_positive(samples=self.samples, period=self.period)
 
     def problem(self, data: FitData, space: ParameterSpace) -> ClosedLoopProblem:
         """Errors of the mean trajectories.

@@ -22,7 +22,6 @@ from wipx.sim.rows import ON_FRICTION
 REACHES = (0.1, 0.2, 0.4)
 STEPS = 6  # Levenberg-Marquardt steps on all known rows, at most
 SETTLED = 1e-3  # relative fall of the squared residuals below which a window is through
-SOFT = 0.03  # share of the joints' speeds over which dry friction builds up in a first estimate
 GUESS_SPAN = 0.08  # [s] of rows through which the first parabola goes
 FEWEST_ROWS = 4  # that a step sees in any case
 DIVERGED = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
@@ -130,12 +129,10 @@ class Predictor:
 
     @cached_property
     def _softened(self) -> "Predictor":
-        """The same, with friction that builds up over a share of the joints' speeds."""
+        """The same, with friction that builds up over what noise feigns as speed in ten milliseconds."""
         if self.simulator.smoothing:
             return self
-        joints = len(self.noise)
-        speeds = np.quantile(np.abs(self._parabola[joints:]), 0.95, axis=1)
-        return replace(self, simulator=replace(self.simulator, smoothing=tuple((SOFT * speeds).tolist())))
+        return replace(self, simulator=replace(self.simulator, smoothing=tuple((100.0 * self.noise).tolist())))
 
     def residuals(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Recorded minus predicted in standard deviations of the noise, zero outside of `rows`.
@@ -198,12 +195,13 @@ class Predictor:
         residuals, gain = self.state_gain(batch, state)
         cost = np.sum(residuals**2, axis=(0, 1))
         damping = np.zeros_like(cost)
+        settled = np.zeros(cost.shape, dtype=bool)  # a window's steps do not depend on the others
         for _ in range(STEPS):
             trial = state + self.correction(gain, residuals, damping)
             trial_residuals, trial_gain = self.state_gain(batch, trial)
             trial_cost = np.sum(trial_residuals**2, axis=(0, 1))
-            better = trial_cost < cost
-            settled = np.abs(cost - trial_cost) <= SETTLED * cost
+            better = (trial_cost < cost) & ~settled
+            settled |= np.abs(cost - trial_cost) <= SETTLED * cost
             state = np.where(better, trial, state)
             residuals = np.where(better, trial_residuals, residuals)
             gain = StateGain(np.where(better, trial_gain.slopes, gain.slopes), gain.steps)

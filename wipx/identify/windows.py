@@ -52,6 +52,21 @@ class Windows:
         )
 
 
+def check_long_enough(recordings: tuple[Recording, ...]) -> None:
+    """Refuse recordings that are shorter than one window.
+
+    Raises:
+        InputError: the first one that is.
+    """
+    shortest = FIRST_START + LOOK_AHEAD
+    for recording in recordings:
+        if recording.duration < shortest:
+            raise InputError(
+                f"{recording.source or recording.name}: {recording.duration:.3g} s long, expected more than "
+                f"{shortest:g} s (one window); leave it out or record longer"
+            )
+
+
 def cut(
     recordings: tuple[Recording, ...],
     plant: Plant,
@@ -73,13 +88,13 @@ def cut(
     Raises:
         InputError: a recording is shorter than one window.
     """
+    check_long_enough(recordings)
     pieces = [
         piece for i, recording in enumerate(recordings) for piece in _pieces(i, recording, horizon, lead, shooting)
     ]
     if not pieces:
-        shortest = FIRST_START + LOOK_AHEAD
         names = ", ".join(r.name for r in recordings)
-        raise InputError(f"{names}: too short for one window; record more than {shortest:g} s")
+        raise InputError(f"{names}: no window of {horizon:g} s has three rows; log faster")
     inputs = Inputs.of(
         [recordings[p.recording].t[p.rows] for p in pieces],
         [recordings[p.recording].stack(plant.commands)[p.rows] for p in pieces],
@@ -116,11 +131,6 @@ class _Piece:
 
 def _pieces(index: int, recording: Recording, horizon: float, lead: float, shooting: bool):
     t = recording.t
-    if t[-1] - t[0] < FIRST_START + LOOK_AHEAD:
-        raise InputError(
-            f"{recording.source or recording.name}: {t[-1] - t[0]:.3g} s long, expected more than "
-            f"{FIRST_START + LOOK_AHEAD:g} s (one window); leave it out or record longer"
-        )
     begin = t[0] if shooting else t[0] + FIRST_START
     for number in range(int(np.ceil((t[-1] - begin) / horizon))):
         start = begin + number * horizon

@@ -104,7 +104,9 @@ def remark(estimate: Estimate) -> str:
     remarks = []
     if estimate.at_bound:
         remarks.append("at a bound of the search; the true value may lie beyond")
-    if not (math.isfinite(estimate.low) and math.isfinite(estimate.high)):
+    if math.isnan(estimate.low) and math.isnan(estimate.high):
+        remarks.append("this objective gives no interval")
+    elif not (math.isfinite(estimate.low) and math.isfinite(estimate.high)):
         remarks.append("interval unbounded: these recordings do not determine it")
     elif estimate.low <= estimate.nominal <= estimate.high:
         remarks.append("interval includes the value before: the change is not significant")

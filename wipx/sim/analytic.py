@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.core.errors import check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.sim import rows as R
@@ -69,6 +70,9 @@ class AnalyticSimulator:
     step: float = 1e-3
     threads: int = 0
     smoothing: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_positive(step=self.step)
 
     def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
         """Open loop: the recorded commands act on every model.
@@ -163,7 +167,7 @@ class _Run:
         self.pattern = [*joints, *(2 + j for j in joints)]
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
-        self.out = np.zeros((self.rows + 1, 4, self.lanes))
+        self.out = np.empty((self.rows + 1, 4, self.lanes))
         late = bool(self.coefficients.present[R.ON_SENSOR_DELAY])
         self.past = np.zeros((self.rows + 1, 4, self.lanes) if late else (1, 4, 1))
 

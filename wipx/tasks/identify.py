@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from wipx.core.errors import check_positive
 from wipx.core.model import Model
 from wipx.core.recording import RecordingSplit
 from wipx.core.results import FitErrors, IdentificationResult
 from wipx.effects.catalogue import effect_of
 from wipx.identify.identification import Identified, Request, identify
 from wipx.identify.objectives import Objective
+from wipx.identify.windows import check_long_enough
 from wipx.recordings.model_file import read_model, write_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
@@ -34,6 +36,9 @@ class Identify:
     horizon: float = 0.5
     lead: float = 0.3
 
+    def __post_init__(self) -> None:
+        check_positive(horizon=self.horizon, lead=self.lead)
+
     def run(self, job: Job) -> None:
         """Read, identify, judge, write."""
         self.complete(job, job.part("recordings"))
@@ -41,7 +46,9 @@ class Identify:
     def complete(self, job: Job, source: RecordingSource) -> IdentificationResult:
         """Identify on the recordings of a source and leave the results in the job's folder."""
         robot = source.describe()
-        split = source.split(source.load())
+        recordings = source.load()
+        check_long_enough(recordings)
+        split = source.split(recordings)
         request = self._request(job, robot)
         objective: Objective = job.part("objective")
         optimizer = job.part("optimizer")
@@ -179,9 +186,18 @@ def _track(job: Job, result: IdentificationResult) -> None:
     names = ("model.yaml", "metrics.json", "report.html", "fit.png", "search.png", "search.csv")
     job.part("tracking").log(
         result.title,
-        job.settings,
+        _flat(job.settings),
         figures,
         {"search/best_loss": np.column_stack([history.evaluations, history.best_loss])},
         [job.out / name for name in names],
         {"plant": result.plant, "source": result.source},
     )
+
+
+def _flat(settings: Mapping[str, object], prefix: str = "") -> dict[str, object]:
+    """Nested settings as one level, "optimizer.starts", so that runs compare."""
+    flat: dict[str, object] = {}
+    for key, value in settings.items():
+        name = f"{prefix}{key}"
+        flat |= _flat(value, f"{name}.") if isinstance(value, Mapping) and value else {name: value}
+    return flat

@@ -5,7 +5,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from wipx.core.errors import InputError
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
@@ -26,6 +26,9 @@ class Predict:
     """
 
     lead: float = 0.3
+
+    def __post_init__(self) -> None:
+        check_positive(lead=self.lead)
 
     def run(self, job: Job) -> None:
         """Write metrics.json and one csv of predicted columns for each recording."""

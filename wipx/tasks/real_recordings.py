@@ -62,8 +62,8 @@ class RealRecordings:
         page: Markdown file whose part between the table marks is replaced; None for none.
     """
 
-    sources: dict[str, Any]
-    cases: dict[str, Any]
+    sources: dict[str, Any] = field(default_factory=dict)
+    cases: dict[str, Any] = field(default_factory=dict)
     only: tuple[str, ...] = ()
     page: str | None = None
 

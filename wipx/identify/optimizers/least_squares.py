@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 from scipy import optimize
 
+from wipx.core.errors import check_positive
 from wipx.identify.optimizers.search import BudgetSpentError, Log, Minimum, Watcher, unwatched
 from wipx.identify.problem import Problem
 
@@ -38,6 +39,10 @@ class LeastSquares:
     tolerance: float = 1e-5
     evaluations: int = 20_000
     seconds: float = 1800.0  # the paper's cap, Sec. VI-C
+
+    def __post_init__(self) -> None:
+        check_positive(starts=self.starts, sample=self.sample, iterations=self.iterations)
+        check_positive(tolerance=self.tolerance, evaluations=self.evaluations, seconds=self.seconds)
 
     def minimise(self, problem: Problem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
         """The best of the searches; ends early within the budget."""

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wipx.core.errors import check_positive
 from wipx.identify.optimizers.search import BudgetSpentError, Log, Minimum, Watcher, unwatched
 from wipx.identify.problem import Problem
 
@@ -35,6 +36,10 @@ class ParticleSwarm:
     w: float = 0.9
     evaluations: int = 1_000_000
     seconds: float = 1800.0  # the paper's cap, Sec. VI-C
+
+    def __post_init__(self) -> None:
+        check_positive(particles=self.particles, iterations=self.iterations)
+        check_positive(evaluations=self.evaluations, seconds=self.seconds)
 
     def minimise(self, problem: Problem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
         """The best particle; ends early within the budget."""

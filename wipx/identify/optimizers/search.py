@@ -114,7 +114,7 @@ class Log:
         self.count += evaluations
         spent = time.monotonic() - self.began
         self.course.append((self.count, spent, self.best_loss))
-        self.watcher(Progress(self.count, spent, self.best_loss, self.share))
+        self.watcher(Progress(self.count, spent, self.best_loss, min(self.share, 1.0)))
         if self.count >= self.evaluations or spent >= self.seconds:
             raise BudgetSpentError
 
