@@ -16,7 +16,9 @@ from wipx.core.plant import plant_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
-RATE, ROWS = 650.0, 780  # paper: controller of 600 to 700 Hz, trajectories of 1.2 s
+RATE, DURATION = 650.0, 1.2  # [Hz, s] paper: controller of 600 to 700 Hz, trajectories of 1.2 s
+ROWS = 780
+SAMPLES = 65.0  # [Hz] paper: 80 samples of a trajectory
 ROUNDS = 5
 BODY = {
     "body_mass": 5.0,
@@ -54,21 +56,24 @@ class Case:
         effects: Key of `EFFECTS`.
         batch: Rollouts of one call.
         substeps: Integration steps per row.
+        rate: Rows per second [Hz].
     """
 
     effects: str
     batch: int
     substeps: int
+    rate: float = RATE
 
     @property
     def name(self) -> str:
         """Label of its row."""
-        return f"{self.effects}, batch {self.batch}, {self.substeps} per row"
+        return f"{self.effects}, batch {self.batch}, {self.rate:g} rows/s, {self.substeps} steps per row"
 
     @property
     def rows(self) -> int:
         """Rows of a rollout; large batches are shortened to keep memory and time small."""
-        return ROWS if self.batch <= 1024 else ROWS // 6
+        rows = round(DURATION * self.rate)
+        return rows if self.batch <= 1024 else rows // 6
 
     @property
     def steps(self) -> int:
@@ -79,7 +84,7 @@ class Case:
         """A call that simulates the batch."""
         plant = plant_of("wip")
         model = Model(plant, plant.complete(BODY, "benchmark"), EFFECTS[self.effects])
-        inputs = Inputs.regular(self.rows / RATE, RATE, 1)
+        inputs = Inputs.regular(self.rows / self.rate, self.rate, 1)
         t = inputs.t[:-1, 0]
         commands = (3.0 * np.sin(2.0 * np.pi * 3.0 * t))[:, None, None]
         inputs = Inputs(inputs.t, commands, inputs.first, inputs.last)
@@ -87,14 +92,15 @@ class Case:
         batch = ModelBatch(model, ("body_mass",), masses)
         initial = np.zeros((4, self.batch, 1))
         initial[1] = 0.02
-        simulator = AnalyticSimulator(step=1.0 / RATE / self.substeps, threads=1)
+        simulator = AnalyticSimulator(step=1.0 / self.rate / self.substeps, threads=1)
         return lambda: simulator.replay(batch, inputs, initial)
 
 
 def measure_kernel() -> dict[str, dict[str, float]]:
     """Steps per second of every variant, printed and returned by name."""
     cases = [Case(effects, 1024, 1) for effects in EFFECTS]
-    cases += [Case(MAIN, batch, 1) for batch in (64, 16384)] + [Case(MAIN, 1024, 5)]
+    cases += [Case(MAIN, batch, 1) for batch in (64, 16384)]
+    cases += [Case(effects, 1024, 10, SAMPLES) for effects in EFFECTS]
     timings = interleaved({case.name: case.rollout() for case in cases}, ROUNDS)
     results, lines = {}, []
     for case in cases:
@@ -103,10 +109,15 @@ def measure_kernel() -> dict[str, dict[str, float]]:
         results[case.name] = {"steps_per_second": rate, "steps": case.steps, **asdict(timing)}
         spread = f"{case.steps / timing.high / 1e6:.1f} to {case.steps / timing.low / 1e6:.1f}"
         lines.append(
-            (case.name, f"{rate / 1e6:.1f}", spread, f"{1e6 * timing.median / case.batch * ROWS / case.rows:.2f}")
+            (
+                case.name,
+                f"{rate / 1e6:.1f}",
+                spread,
+                f"{1e6 * timing.median / case.batch * DURATION * case.rate / case.rows:.2f}",
+            )
         )
     print_table(
-        f"Analytic simulator, one thread; a rollout has {ROWS} rows",
+        f"Analytic simulator, one thread; a rollout of {DURATION:g} s has {ROWS} steps",
         ("variant", "million steps/s", "of the rounds", "us per rollout"),
         lines,
     )

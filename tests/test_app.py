@@ -96,7 +96,7 @@ def test_a_task_gets_its_settings_and_leaves_its_configuration(command_line: Com
         ("model.pth=x", "model: unknown key 'pth'; did you mean path?"),
         ("free.body_mass=x", "free.body_mass is 'x', expected a number or null"),
         ("bounds.body_mass=[2,1]", "bounds.body_mass is [2, 1], expected [low, high] with low < high"),
-        ("bounds.body_mass=[1,2,3]", "bounds.body_mass is [1.0, 2.0, 3.0], expected a list of 2 items"),
+        ("bounds.body_mass=[1,2,3]", "bounds.body_mass is [1, 2, 3], expected a list of 2 items"),
         ("task.behaviour=refuse", "r3.csv row 812: t decreases; sort or drop the row"),
     ],
 )

@@ -229,6 +229,7 @@ class _Run:
 
     def rollouts(self, commands: np.ndarray) -> Rollouts:
         shape = (self.rows + 1, len(self.joints), self.batch.size, self.inputs.windows)
-        coordinates = self.out[:, self.joints].reshape(shape)
-        rates = self.out[:, [2 + j for j in self.joints]].reshape(shape)
+        first, last = self.joints[0], self.joints[-1] + 1  # slices, not copies: the joints are neighbours
+        coordinates = self.out[:, first:last].reshape(shape)
+        rates = self.out[:, 2 + first : 2 + last].reshape(shape)
         return Rollouts(coordinates, rates, commands)
