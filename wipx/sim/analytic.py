@@ -160,6 +160,7 @@ class _Run:
         self.coefficients = coefficients(batch)
         for site, speed in zip(self.plant.joints, simulator.smoothing, strict=False):
             self.coefficients.rows[R.SMOOTHING + joint_index(site)] = speed
+            self.coefficients.present[R.ON_SMOOTHING] = True
         self.rows = len(inputs.t) - 1
         self.lanes = batch.size * inputs.windows
         joints = [joint_index(site) for site in self.plant.joints]

@@ -80,6 +80,31 @@ def smooth_friction(S, on, j):
 
 
 @law
+def stick_or_slide(S, on):
+    """Take from the rates at the end of the step what dry friction takes: all of it, or its level."""
+    for w in range(W):
+        S[R.YIELD * W + w] = S[R.W11 * W + w]
+        S[R.YIELD1 * W + w] = S[R.W22 * W + w]
+    if on[R.ON_SMOOTHING]:  # a joint that yields while it "sticks" is a compliance in series
+        for j in range(2):
+            for w in range(W):
+                reach = S[R.STEP * W + w] * (S[(R.PLUS + j) * W + w] + S[(R.MINUS + j) * W + w])
+                S[(R.YIELD + j) * W + w] += 2.0 * S[(R.SMOOTHING + j) * W + w] / maximum(reach, 1e-15)
+    for w in range(W):
+        h = S[R.STEP * W + w]
+        w11, w12, w22 = S[R.W11 * W + w], S[R.W12 * W + w], S[R.W22 * W + w]
+        b0, b1 = S[R.NEXT * W + w], S[R.NEXT1 * W + w]
+        low0, high0 = -h * S[R.PLUS * W + w], h * S[R.MINUS * W + w]
+        low1, high1 = -h * S[R.PLUS1 * W + w], h * S[R.MINUS1 * W + w]
+        c11, c22 = S[R.YIELD * W + w], S[R.YIELD1 * W + w]
+        both_stick = (w12 * b0 - c11 * b1) / (c11 * c22 - w12 * w12)
+        p0 = clip(-(b0 + w12 * clip(both_stick, low1, high1)) / c11, low0, high0)
+        p1 = clip(-(b1 + w12 * p0) / c22, low1, high1)
+        S[R.NEXT * W + w] = b0 + w11 * p0 + w12 * p1
+        S[R.NEXT1 * W + w] = b1 + w12 * p0 + w22 * p1
+
+
+@law
 def move(S, on):
     """Solve for the rates at the end of the step, with sticking, and drift the second half."""
     for w in range(W):
@@ -98,20 +123,7 @@ def move(S, on):
         S[R.NEXT * W + w] = v0 + (a22 * r0 - a12 * r1) * inverse
         S[R.NEXT1 * W + w] = v1 + (a11 * r1 - a12 * r0) * inverse
     if on[R.ON_FRICTION]:
-        for w in range(W):
-            h = S[R.STEP * W + w]
-            w11, w12, w22 = S[R.W11 * W + w], S[R.W12 * W + w], S[R.W22 * W + w]
-            b0, b1 = S[R.NEXT * W + w], S[R.NEXT1 * W + w]
-            low0, high0 = -h * S[R.PLUS * W + w], h * S[R.MINUS * W + w]
-            low1, high1 = -h * S[R.PLUS1 * W + w], h * S[R.MINUS1 * W + w]
-            # A joint that yields while it "sticks" (smoothing) is a compliance in series.
-            c11 = w11 + 2.0 * S[R.SMOOTHING * W + w] / maximum(high0 - low0, 1e-15)
-            c22 = w22 + 2.0 * S[R.SMOOTHING1 * W + w] / maximum(high1 - low1, 1e-15)
-            both_stick = (w12 * b0 - c11 * b1) / (c11 * c22 - w12 * w12)
-            p0 = clip(-(b0 + w12 * clip(both_stick, low1, high1)) / c11, low0, high0)
-            p1 = clip(-(b1 + w12 * p0) / c22, low1, high1)
-            S[R.NEXT * W + w] = b0 + w11 * p0 + w12 * p1
-            S[R.NEXT1 * W + w] = b1 + w12 * p0 + w22 * p1
+        stick_or_slide(S, on)
     for j in range(2):
         for w in range(W):
             before, after = S[(R.V + j) * W + w], S[(R.NEXT + j) * W + w]
