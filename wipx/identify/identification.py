@@ -9,6 +9,7 @@ from wipx.core.model import Model
 from wipx.core.recording import RecordingSplit
 from wipx.core.results import Estimate, FitErrors, SearchHistory, Trace
 from wipx.effects.catalogue import check_together, effect_of
+from wipx.identify.closed_loop import ClosedLoopProblem
 from wipx.identify.evaluation import Judge
 from wipx.identify.intervals import intervals
 from wipx.identify.noise import sensor_noise
@@ -19,6 +20,7 @@ from wipx.identify.problem import WindowProblem
 from wipx.sim.analytic import AnalyticSimulator, StateFeedback
 
 AT_BOUND = 1e-4  # of the search interval
+ABSENT = 1e-6  # likewise, from the neutral value
 WORSE = 1.01  # ratio of errors from which a model is called worse
 UNEVEN = 1.5  # ratio of the signals' errors from which their weights are set anew
 
@@ -109,13 +111,16 @@ def identify(
     minimum = optimizer.minimise(problem, rng, watcher)
     if isinstance(problem, WindowProblem):
         problem, minimum = _weighed_anew(problem, minimum, optimizer, rng, watcher)
-    values = problem.space.to_values(minimum.cube)
+    # The search keeps a hair's breadth inside its bounds; an effect that it does not want is absent.
+    unwanted = np.abs(minimum.cube - problem.space.neutral) < ABSENT
+    cube = np.where(unwanted, problem.space.neutral, minimum.cube)
+    values = problem.space.to_values(cube)
     completed = space.model.with_values(dict(zip(space.names, values.tolist(), strict=True)))
     judge = Judge(simulator, noise, horizon, lead)
     fit, fit_traces = judge.compare(nominal, completed, split.fit, held_out=False)
     unseen, traces = judge.compare(nominal, completed, split.held_out, held_out=True) if split.held_out else (None, ())
-    ends = _intervals(objective, problem, data, minimum.cube)
-    estimates = _estimates(problem.space, minimum.cube, ends)
+    ends = _intervals(problem, cube)
+    estimates = _estimates(problem.space, cube, ends)
     return Identified(
         completed,
         estimates,
@@ -159,7 +164,7 @@ def _joined(first: SearchHistory, second: SearchHistory) -> SearchHistory:
     )
 
 
-def _intervals(objective: Objective, problem, data: FitData, cube: np.ndarray) -> np.ndarray:
+def _intervals(problem: WindowProblem | ClosedLoopProblem, cube: np.ndarray) -> np.ndarray:
     """95 % intervals; a closed-loop problem has too few independent pieces to give any."""
     if isinstance(problem, WindowProblem):
         return intervals(problem, cube)
