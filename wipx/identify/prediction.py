@@ -20,8 +20,8 @@ from wipx.sim.rows import ON_FRICTION
 # The estimate first sees this much of a window [s]: an unstable plant is linear in its first
 # state only for a short time.
 REACHES = (0.1, 0.2, 0.4)
-STEPS = 6  # Levenberg-Marquardt steps on all known rows, at most
-SETTLED = 1e-3  # relative fall of the squared residuals below which a window is through
+STEPS = 8  # Levenberg-Marquardt steps on all known rows, at most
+SETTLED = 1e-6  # relative fall of the squared residuals below which a window is through
 GUESS_SPAN = 0.08  # [s] of rows through which the first parabola goes
 FEWEST_ROWS = 4  # that a step sees in any case
 DIVERGED = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
