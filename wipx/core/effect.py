@@ -17,9 +17,13 @@ class Effect:
         sites: Sites at which it can act.
         parameters: Numbers of the law.
         law: The equation, as text.
+        linear_in: Parameters in proportion to which, counted from neutral, the effect grows at least
+            roughly; empty where it has a threshold.
         source: Paper or book.
         excludes: Kinds that cannot act at the same site at the same time.
         needs: Joints or plant parameters without which the effect has no meaning.
+        beyond: Whether contract section 3 lacks it: a diagnosis names such an effect only where those of the
+            contract leave something over.
     """
 
     kind: str
@@ -27,8 +31,10 @@ class Effect:
     parameters: tuple[Parameter, ...]
     law: str
     source: str
+    linear_in: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    beyond: bool = False
 
     @property
     def neutral(self) -> dict[str, float]:

@@ -71,6 +71,7 @@ class Parameter:
         low: Lower end of the search interval, in multiples of the joint's `Scales`.
         high: Upper end, likewise.
         start: Where a search begins, likewise.
+        grid: Values at which a diagnosis looks for the effect, likewise; empty for `start` alone.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Parameter:
     low: float
     high: float
     start: float
+    grid: tuple[float, ...] = ()
 
     def unit(self, *, angular: bool) -> str:
         """The SI unit at a turning (`angular`) or a sliding joint."""

@@ -7,10 +7,15 @@ EFFECT = Effect(
     kind="asymmetric_coulomb",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("F_plus", "level while v > 0", "force", 0.0, 0.0, 1.0, 0.02),
-        Parameter("F_minus", "level while v < 0", "force", 0.0, 0.0, 1.0, 0.02),
+        Parameter("F_plus", "level while v > 0", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.0, 0.03)),
+        Parameter("F_minus", "level while v < 0", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.0, 0.03)),
     ),
     law="-F_plus for v > 0, F_minus for v < 0, any force in [-F_plus, F_minus] at v = 0",
+    linear_in=(
+        "F_plus",
+        "F_minus",
+    ),
     source="Bona, Indri 2005, Friction compensation in robotics: an overview, CDC",
     excludes=("coulomb",),
+    beyond=True,
 )

@@ -10,7 +10,11 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="back_emf",
     sites=("actuator",),
-    parameters=(Parameter("k_e", "force lost per speed, k_t^2/R at the joint", "damping", 0.0, 0.0, 3.0, 0.02),),
+    parameters=(
+        Parameter("k_e", "force lost per speed, k_t^2/R at the joint", "damping", 0.0, 0.0, 3.0, 0.02, grid=(0.02,)),
+    ),
     law="F = u - k_e v",
+    linear_in=("k_e",),
     source="DC motor equation; Duclusaud, Passault 2025, arXiv:2410.08650",
+    beyond=True,
 )

@@ -13,8 +13,19 @@ EFFECT = Effect(
     kind="backlash",
     sites=("actuator",),
     parameters=(
-        Parameter("gap", "play at the wheel's rim or the joint", "coordinate", 0.0, 0.0, 0.3, 2e-3),
-        Parameter("drive_inertia", "of the free drive, at the same place", "inertia", 1.0, 1e-3, 0.3, 0.02),
+        Parameter(
+            "gap",
+            "play at the wheel's rim or the joint",
+            "coordinate",
+            0.0,
+            0.0,
+            0.3,
+            2e-3,
+            grid=(0.0005, 0.002, 0.01, 0.03),
+        ),
+        Parameter(
+            "drive_inertia", "of the free drive, at the same place", "inertia", 1.0, 1e-3, 0.3, 0.02, grid=(0.005, 0.05)
+        ),
     ),
     law="0 while the drive crosses the gap, F in contact",
     source="Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38(10)",

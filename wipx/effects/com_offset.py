@@ -6,8 +6,9 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="com_offset",
     sites=("geometry",),
-    parameters=(Parameter("theta_eq", "pitch at which the body balances", "angle", 0.0, -0.5, 0.5, 0.0),),
+    parameters=(Parameter("theta_eq", "pitch at which the body balances", "angle", 0.0, -0.5, 0.5, 0.0, grid=(0.01,)),),
     law="theta - theta_eq in place of theta",
+    linear_in=("theta_eq",),
     source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
     needs=("com_height",),
 )

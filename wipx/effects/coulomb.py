@@ -6,7 +6,8 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="coulomb",
     sites=JOINT_SITES,
-    parameters=(Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02),),
+    parameters=(Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.01, 0.05)),),
     law="-F_c s(v), any force in [-F_c, F_c] at v = 0",
+    linear_in=("F_c",),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
 )

@@ -7,8 +7,9 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="dead_zone",
     sites=("actuator",),
-    parameters=(Parameter("band", "half width", "force", 0.0, 0.0, 0.5, 0.02),),
+    parameters=(Parameter("band", "half width", "force", 0.0, 0.0, 0.5, 0.02, grid=(0.01, 0.05, 0.2)),),
     law="0 for abs(u) < band, else u - band s(u)",
+    linear_in=("band",),
     source="Tao, Kokotovic 1996, Adaptive control of systems with actuator and sensor nonlinearities",
 )
 

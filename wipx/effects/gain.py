@@ -6,7 +6,8 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="gain",
     sites=("actuator",),
-    parameters=(Parameter("k", "force per commanded force", "ratio", 1.0, 0.2, 5.0, 1.0),),
+    parameters=(Parameter("k", "force per commanded force", "ratio", 1.0, 0.2, 5.0, 1.0, grid=(0.9, 1.1)),),
     law="F = k u",
+    linear_in=("k",),
     source="torque-constant error, BAM documentation of DC motors, github.com/Rhoban/bam",
 )

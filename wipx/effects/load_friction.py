@@ -11,11 +11,16 @@ EFFECT = Effect(
     kind="load_friction",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("K_motor", "friction per force of the motor", "ratio", 0.0, 0.0, 1.0, 0.05),
-        Parameter("K_external", "friction per force of the load", "ratio", 0.0, 0.0, 1.0, 0.05),
+        Parameter("K_motor", "friction per force of the motor", "ratio", 0.0, 0.0, 1.0, 0.05, grid=(0.0, 0.1)),
+        Parameter("K_external", "friction per force of the load", "ratio", 0.0, 0.0, 1.0, 0.05, grid=(0.0, 0.1)),
     ),
     law="-s(v) abs(K_external F_load - K_motor F_motor), sticking at v = 0",
+    linear_in=(
+        "K_motor",
+        "K_external",
+    ),
     source="Duclusaud, Passault 2025, Extended friction models for servo actuators, arXiv:2410.08650",
+    beyond=True,
 )
 
 

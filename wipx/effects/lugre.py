@@ -18,6 +18,12 @@ EFFECT = Effect(
         Parameter("damping", "of the bristle", "damping", 0.0, 0.0, 3.0, 0.01),
     ),
     law="-(stiffness z + damping z'), z' = v - stiffness abs(v) z / g(v), g = F_c + (F_s - F_c) exp(-(v/v_s)^2)",
+    linear_in=(
+        "F_c",
+        "F_s",
+        "stiffness",
+    ),
     source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3)",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding"),
+    beyond=True,
 )

@@ -7,10 +7,11 @@ EFFECT = Effect(
     kind="payload",
     sites=("geometry",),
     parameters=(
-        Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05),
-        Parameter("height", "above the wheel axis", "length", 1.0, -1.0, 4.0, 1.0),
+        Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05, grid=(0.05,)),
+        Parameter("height", "above the wheel axis", "length", 1.0, -1.0, 4.0, 1.0, grid=(0.3, 1.0, 2.0)),
     ),
     law="m_b + m; L and I_b about the new centre of mass (parallel axes)",
+    linear_in=("mass",),
     source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
     needs=("body_mass",),
 )

@@ -8,10 +8,14 @@ EFFECT = Effect(
     kind="presliding",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("F_c", "level in steady sliding", "force", 0.0, 0.0, 1.0, 0.02),
-        Parameter("stiffness", "of the bristle", "stiffness", 1.0, 1e-2, 1e5, 100.0),
+        Parameter("F_c", "level in steady sliding", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02, 0.1)),
+        Parameter("stiffness", "of the bristle", "stiffness", 1.0, 1e-2, 1e5, 100.0, grid=(1.0, 10.0, 100.0)),
     ),
     law="-stiffness z, z' = v - stiffness abs(v) z / F_c",
+    linear_in=(
+        "F_c",
+        "stiffness",
+    ),
     source="Dahl 1968, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "lugre"),
 )

@@ -7,8 +7,9 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="quadratic_drag",
     sites=JOINT_SITES,
-    parameters=(Parameter("c", "drag coefficient", "drag", 0.0, 0.0, 3.0, 0.02),),
+    parameters=(Parameter("c", "drag coefficient", "drag", 0.0, 0.0, 3.0, 0.02, grid=(0.02, 0.1)),),
     law="-c v abs(v)",
+    linear_in=("c",),
     source="Kaheman, Kaiser, Strom, Kutz, Brunton 2019, arXiv:1909.08574",
 )
 

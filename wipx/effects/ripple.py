@@ -9,10 +9,18 @@ EFFECT = Effect(
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),
         Parameter(
-            "n", "periods per radian of the wheel (or of the joint, where it turns)", "ratio", 1.0, 1.0, 60.0, 6.0
+            "n",
+            "periods per radian of the wheel (or of the joint, where it turns)",
+            "ratio",
+            1.0,
+            1.0,
+            60.0,
+            6.0,
+            grid=tuple(float(n) for n in range(2, 41)),
         ),
-        Parameter("phase", "angle of the first crest", "angle", 0.0, -3.2, 3.2, 0.0),
+        Parameter("phase", "angle of the first crest", "angle", 0.0, -3.2, 3.2, 0.0, grid=(0.0, 1.57)),
     ),
     law="+ A cos(n x/r + phase)",
+    linear_in=("A",),
     source="Holtz, Springob 1996, Identification and compensation of torque ripple, IEEE TIE 43(2)",
 )

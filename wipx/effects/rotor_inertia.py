@@ -6,7 +6,9 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="rotor_inertia",
     sites=JOINT_SITES,
-    parameters=(Parameter("J", "reflected inertia", "inertia", 0.0, 0.0, 10.0, 0.1),),
+    parameters=(Parameter("J", "reflected inertia", "inertia", 0.0, 0.0, 10.0, 0.1, grid=(0.05,)),),
     law="-J v'",
+    linear_in=("J",),
     source="Spong 1987, Modeling and control of elastic joint robots, ASME JDSMC 109(4)",
+    beyond=True,
 )

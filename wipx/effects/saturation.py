@@ -6,7 +6,9 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="saturation",
     sites=("actuator",),
-    parameters=(Parameter("F_max", "largest force", "force", 1e9, 0.05, 2.0, 0.8),),
+    parameters=(
+        Parameter("F_max", "largest force", "force", 1e9, 0.05, 2.0, 0.8, grid=(0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
+    ),
     law="F = clip(u, -F_max, F_max)",
     source="force range of actuators, MuJoCo documentation",
 )

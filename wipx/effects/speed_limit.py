@@ -8,8 +8,8 @@ EFFECT = Effect(
     kind="speed_limit",
     sites=("actuator",),
     parameters=(
-        Parameter("F_stall", "largest force at rest", "force", 1e9, 0.05, 5.0, 1.0),
-        Parameter("v_free", "speed without load", "velocity", 1e9, 0.3, 20.0, 2.0),
+        Parameter("F_stall", "largest force at rest", "force", 1e9, 0.05, 5.0, 1.0, grid=(0.4, 0.6, 0.8, 1.0, 1.5)),
+        Parameter("v_free", "speed without load", "velocity", 1e9, 0.3, 20.0, 2.0, grid=(0.8, 1.2, 2.0, 4.0)),
     ),
     law="driving: abs(F) <= F_stall (1 - abs(v)/v_free); braking: abs(F) <= F_stall",
     source="torque-speed line of a DC motor, BAM documentation, github.com/Rhoban/bam",

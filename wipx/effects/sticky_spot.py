@@ -8,11 +8,30 @@ EFFECT = Effect(
     kind="sticky_spot",
     sites=("translation",),
     parameters=(
-        Parameter("F_c", "extra level", "force", 0.0, 0.0, 1.0, 0.05),
-        Parameter("lo", "where it begins", "coordinate", 0.0, -1.0, 1.0, -0.1),
-        Parameter("hi", "where it ends", "coordinate", 0.0, -1.0, 1.0, 0.1),
+        Parameter("F_c", "extra level", "force", 0.0, 0.0, 1.0, 0.05, grid=(0.03,)),
+        Parameter(
+            "lo",
+            "where it begins",
+            "coordinate",
+            0.0,
+            -1.0,
+            1.0,
+            -0.1,
+            grid=(-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75),
+        ),
+        Parameter(
+            "hi",
+            "where it ends",
+            "coordinate",
+            0.0,
+            -1.0,
+            1.0,
+            0.1,
+            grid=(-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0),
+        ),
     ),
     law="-F_c s(v) for lo <= x <= hi",
+    linear_in=("F_c",),
     source="Popovic, Goldenberg 1998, Modeling of friction using spectral analysis, IEEE TRA 14(1)",
 )
 

@@ -8,11 +8,15 @@ EFFECT = Effect(
     kind="stribeck",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02),
-        Parameter("F_s", "static level, above F_c", "force", 0.0, 0.0, 1.0, 0.03),
-        Parameter("v_s", "Stribeck velocity", "velocity", 1.0, 2e-3, 1.0, 0.05),
+        Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02,)),
+        Parameter("F_s", "static level, above F_c", "force", 0.0, 0.0, 1.0, 0.03, grid=(0.03, 0.06)),
+        Parameter("v_s", "Stribeck velocity", "velocity", 1.0, 2e-3, 1.0, 0.05, grid=(0.02, 0.1, 0.4)),
     ),
     law="-s(v) [F_c + (F_s - F_c) exp(-(v/v_s)^2)], sticking below F_s at v = 0",
+    linear_in=(
+        "F_c",
+        "F_s",
+    ),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
     excludes=("coulomb", "asymmetric_coulomb"),
 )

@@ -6,7 +6,8 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="viscous",
     sites=JOINT_SITES,
-    parameters=(Parameter("sigma", "viscous coefficient", "damping", 0.0, 0.0, 3.0, 0.02),),
+    parameters=(Parameter("sigma", "viscous coefficient", "damping", 0.0, 0.0, 3.0, 0.02, grid=(0.02, 0.1)),),
     law="-sigma v",
+    linear_in=("sigma",),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
 )

@@ -80,16 +80,7 @@ class Predictor:
 
     def first_guess(self, batch: ModelBatch) -> np.ndarray:
         """States from a parabola through the first known rows, shape (2 joints, P, R)."""
-        true = np.repeat(self._parabola[:, None, :], batch.size, axis=1)
-        joints = len(true) // 2
-        for j, column in enumerate(batch.model.plant.coordinates):
-            effects = batch.model.effects
-            bias, scale = f"sensor_{column}/bias", f"sensor_{column}/scale"
-            if bias in effects:
-                true[j] -= batch.column(f"{bias}.b")[:, None]
-            if scale in effects:
-                true[[j, joints + j]] /= 1.0 + batch.column(f"{scale}.e")[:, None]
-        return true
+        return true_state(batch, np.repeat(self._parabola[:, None, :], batch.size, axis=1))
 
     def predict(self, batch: ModelBatch, near: np.ndarray | None = None, *, floor: bool = False) -> Prediction:
         """Estimate the states of all windows and predict them.
@@ -288,6 +279,20 @@ class Settled:
     state: np.ndarray
     gain: StateGain
     cost: np.ndarray
+
+
+def true_state(batch: ModelBatch, shown: np.ndarray) -> np.ndarray:
+    """States behind what the sensors show, their bias and scale undone; shapes (2 joints, P, R)."""
+    true = shown.copy()
+    joints = len(true) // 2
+    for j, column in enumerate(batch.model.plant.coordinates):
+        effects = batch.model.effects
+        bias, scale = f"sensor_{column}/bias", f"sensor_{column}/scale"
+        if bias in effects:
+            true[j] -= batch.column(f"{bias}.b")[:, None]
+        if scale in effects:
+            true[[j, joints + j]] /= 1.0 + batch.column(f"{scale}.e")[:, None]
+    return true
 
 
 def _last_row(rows: np.ndarray) -> np.ndarray:

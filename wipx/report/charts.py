@@ -8,7 +8,7 @@ import numpy as np
 
 from wipx.core.results import FitErrors, IdentificationResult, SearchHistory, Trace
 from wipx.report.numbers import scale_for, significant
-from wipx.report.outcome import SignalErrors, error_scale, judged_fit, signal_errors
+from wipx.report.outcome import ModelComparison, SignalErrors, error_scale, judged_fit, signal_errors
 from wipx.report.traces import break_at_restarts, decimate, prediction_error
 
 MOST_ROWS = 4000  # rows of one trace; more than a screen has pixels
@@ -16,7 +16,7 @@ MOST_VALUES = 180_000  # in all charts: 1 MB of the page, beside 5 MB of plotly.
 MOST_TRACES = 12
 
 
-def shown_traces(result: IdentificationResult) -> tuple[Trace, ...]:
+def shown_traces(result: ModelComparison) -> tuple[Trace, ...]:
     """The traces that the page shows: held-out ones first, `MOST_TRACES` at most."""
     return tuple(sorted(result.traces, key=lambda trace: not trace.held_out))[:MOST_TRACES]
 
@@ -29,26 +29,30 @@ def row_limit(traces: tuple[Trace, ...]) -> int:
 
 def chart_data(result: IdentificationResult) -> dict:
     """Everything that the page's script draws; holds only what JSON can, nothing infinite."""
+    return {**comparison_data(result), "search": _search(result.history)}
+
+
+def comparison_data(result: ModelComparison) -> dict:
+    """The part of a page's data that compares the nominal with the completed model."""
     traces = shown_traces(result)
     limit = row_limit(traces)
     return {
         "traces": [_trace(result, trace, limit) for trace in traces],
         "errors": _errors(signal_errors(result)),
-        "search": _search(result.history),
     }
 
 
-def _trace(result: IdentificationResult, trace: Trace, limit: int) -> dict:
+def _trace(result: ModelComparison, trace: Trace, limit: int) -> dict:
     shown = break_at_restarts(decimate(trace, limit))
     return {
         "caption": _caption(result, trace, len(decimate(trace, limit).t)),
-        "t": _packed(shown.t),
+        "t": packed(shown.t),
         "signals": [_signal(result, shown, column) for column in shown.recorded],
         "commands": [_command(result, column, values) for column, values in shown.command.items()],
     }
 
 
-def _signal(result: IdentificationResult, shown: Trace, column: str) -> dict:
+def _signal(result: ModelComparison, shown: Trace, column: str) -> dict:
     recorded = shown.recorded[column]
     scale = scale_for([_largest(recorded)], result.units.get(column, ""))
     errors = error_scale(result, column)
@@ -58,19 +62,19 @@ def _signal(result: IdentificationResult, shown: Trace, column: str) -> dict:
         "unit": scale.unit,
         "errorFactor": errors.factor,
         "errorUnit": errors.unit,
-        "noiseFloor": _number(_floors(judged_fit(result), column)),
-        "recorded": _packed(recorded),
-        "nominal": _packed(shown.nominal[column]),
-        "completed": _packed(shown.completed[column]),
+        "noiseFloor": json_number(_floors(judged_fit(result), column)),
+        "recorded": packed(recorded),
+        "nominal": packed(shown.nominal[column]),
+        "completed": packed(shown.completed[column]),
     }
 
 
-def _command(result: IdentificationResult, column: str, values: np.ndarray) -> dict:
+def _command(result: ModelComparison, column: str, values: np.ndarray) -> dict:
     scale = scale_for([_largest(values)], result.units.get(column, ""))
-    return {"name": column, "factor": scale.factor, "unit": scale.unit, "values": _packed(values)}
+    return {"name": column, "factor": scale.factor, "unit": scale.unit, "values": packed(values)}
 
 
-def _caption(result: IdentificationResult, trace: Trace, rows: int) -> str:
+def _caption(result: ModelComparison, trace: Trace, rows: int) -> str:
     """The errors of one recording, and whether it is drawn with fewer points than it has."""
     nominal, completed = prediction_error(trace, trace.nominal), prediction_error(trace, trace.completed)
     changes = []
@@ -94,9 +98,9 @@ def _errors(rows: tuple[SignalErrors, ...]) -> list[dict]:
                 "signal": signal,
                 "unit": group[0].scale.unit,
                 "recordings": [row.recordings for row in group],
-                "nominal": [_number(row.nominal) for row in group],
-                "completed": [_number(row.completed) for row in group],
-                "noiseFloor": [_number(row.noise_floor) for row in group],
+                "nominal": [json_number(row.nominal) for row in group],
+                "completed": [json_number(row.completed) for row in group],
+                "noiseFloor": [json_number(row.noise_floor) for row in group],
                 "nominalText": [significant(row.nominal) for row in group],
                 "completedText": [significant(row.completed) for row in group],
                 "noiseFloorText": [significant(row.noise_floor) for row in group],
@@ -118,8 +122,8 @@ def _search(history: SearchHistory) -> dict | None:
         return None
     return {
         "evaluations": [int(count) for count in history.evaluations],
-        "seconds": [_number(time) for time in history.seconds],
-        "bestLoss": [_number(loss) for loss in history.best_loss],
+        "seconds": [json_number(time) for time in history.seconds],
+        "bestLoss": [json_number(loss) for loss in history.best_loss],
         "logarithmic": wants_logarithm(history.best_loss.tolist()),
     }
 
@@ -133,12 +137,12 @@ def _largest(values: np.ndarray) -> float:
     return float(finite.max(initial=0.0))
 
 
-def _number(value: float) -> float | None:
+def json_number(value: float) -> float | None:
     """A number that JSON can hold; None for NaN and infinities."""
     return float(value) if math.isfinite(value) else None
 
 
-def _packed(values: np.ndarray) -> str:
+def packed(values: np.ndarray) -> str:
     """Little-endian 32-bit floats in base64: a third of the size of their decimal digits."""
     with np.errstate(over="ignore"):
         return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")

@@ -1,25 +1,16 @@
 """The outcome as pictures: for a README, a paper's draft or an experiment log."""
 
-import io
 from pathlib import Path
 
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wipx.core.results import IdentificationResult, Trace
+from wipx.core.results import IdentificationResult
 from wipx.report.charts import wants_logarithm
 from wipx.report.files import write_whole
-from wipx.report.numbers import scale_for, significant
-from wipx.report.outcome import judged_errors, judged_fit, search_summary
-from wipx.report.traces import between, break_at_restarts, decimate, improvement, prediction_error
+from wipx.report.outcome import judged_errors, search_summary
+from wipx.report.panels import COMPLETED, MUTED, draw_errors, draw_signal, png, quiet, representative_stretch, with_unit
 
-RECORDED, NOMINAL, COMPLETED, FLOOR = "#b9c0c8", "#d55e00", "#0072b2", "#8a939e"  # Okabe and Ito 2008
-MUTED, GRID = "#5b6470", "#e3e7eb"
-SHOWN_WINDOWS = 6
-WIDTH = 9.0  # inches; with DPI twice the 900 pixels it is read at
-DPI = 200
-MOST_ROWS = 4000
+WIDTH = 9.0  # inches; at `panels.DPI` twice the 900 pixels it is read at
 
 
 def draw_fit(result: IdentificationResult, path: Path) -> None:
@@ -35,14 +26,14 @@ def draw_fit(result: IdentificationResult, path: Path) -> None:
     rows = judged_errors(result)
     figure = Figure(figsize=(WIDTH, 1.0 + 2.1 * len(rows)), layout="constrained")
     grid = figure.add_gridspec(len(rows), 2, width_ratios=(3.0, 1.0))
-    shown = _representative(result)
+    shown = representative_stretch(result)
     for row, errors in enumerate(rows):
         bars = figure.add_subplot(grid[row, 1])
         heights = (errors.nominal, errors.completed, errors.noise_floor)
-        _draw_errors(bars, heights, title=_with_unit(f"error of {errors.signal}", errors.scale.unit))
+        draw_errors(bars, heights, title=with_unit(f"error of {errors.signal}", errors.scale.unit))
         if shown is not None and errors.signal in shown.recorded:
             signal = figure.add_subplot(grid[row, 0])
-            _draw_signal(signal, shown, errors.signal, result.units.get(errors.signal, ""))
+            draw_signal(signal, shown, errors.signal, result.units.get(errors.signal, ""))
             signal.tick_params(labelbottom=row == len(rows) - 1)
     if shown is not None:
         figure.axes[-1].set_xlabel("time [s]; predictions restart at every vertical line", color=MUTED)
@@ -50,7 +41,7 @@ def draw_fit(result: IdentificationResult, path: Path) -> None:
         kind = "held-out" if shown.held_out else "fitted"
         title = f"{result.title}: {kind} recording {shown.name}"
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, parse_math=False)
-    write_whole(path, _png(figure))
+    write_whole(path, png(figure))
 
 
 def draw_search(result: IdentificationResult, path: Path) -> None:
@@ -62,7 +53,7 @@ def draw_search(result: IdentificationResult, path: Path) -> None:
     history = result.history
     figure = Figure(figsize=(WIDTH, 3.2), layout="constrained")
     axes = figure.add_subplot()
-    _quiet(axes)
+    quiet(axes)
     axes.step(history.evaluations, history.best_loss, where="post", color=COMPLETED, linewidth=1.8)
     axes.plot(history.evaluations[-1:], history.best_loss[-1:], "o", color=COMPLETED, markersize=5)
     if wants_logarithm(history.best_loss.tolist()):
@@ -70,89 +61,4 @@ def draw_search(result: IdentificationResult, path: Path) -> None:
     axes.set_xlabel("evaluations", color=MUTED)
     axes.set_ylabel("best loss", color=MUTED)
     axes.set_title(search_summary(result), loc="left", fontsize=10, parse_math=False)
-    write_whole(path, _png(figure))
-
-
-def _representative(result: IdentificationResult) -> Trace | None:
-    """The stretch of a recording that `draw_fit` shows; None where nothing was recorded."""
-    held_out = [trace for trace in result.traces if trace.held_out]
-    trace = _quantile(held_out or list(result.traces), 0.5)
-    if trace is None:
-        return None
-    length = SHOWN_WINDOWS * judged_fit(result).horizon
-    begins = [begin for begin in trace.starts if begin + length <= trace.t[-1] + 1e-9]
-    stretch = _quantile([between(trace, begin, begin + length) for begin in begins], 0.75)
-    return break_at_restarts(decimate(stretch or trace, MOST_ROWS))
-
-
-def _quantile(traces: list[Trace], share: float) -> Trace | None:
-    """The trace that improves more than that share of them; None where none improves or worsens measurably."""
-    gains = np.array([improvement(trace) for trace in traces])
-    known = np.flatnonzero(np.isfinite(gains))
-    if len(known) == 0:
-        return traces[0] if traces else None
-    ranked = known[np.argsort(gains[known])]
-    return traces[ranked[round(share * (len(ranked) - 1))]]
-
-
-def _draw_signal(axes: Axes, trace: Trace, column: str, unit: str) -> None:
-    recorded = trace.recorded[column]
-    finite = recorded[np.isfinite(recorded)]
-    scale = scale_for([np.abs(finite).max(initial=0.0)], unit)
-    _quiet(axes)
-    axes.plot(trace.t, scale.factor * recorded, color=RECORDED, linewidth=4.0, label="recorded")
-    axes.plot(trace.t, scale.factor * trace.nominal[column], "--", color=NOMINAL, linewidth=1.4, label="nominal model")
-    axes.plot(trace.t, scale.factor * trace.completed[column], color=COMPLETED, linewidth=1.4, label="completed model")
-    axes.set_xlim(trace.t[0], trace.t[-1])
-    axes.grid(visible=False, axis="x")
-    for start in trace.starts[(trace.starts > trace.t[0]) & (trace.starts < trace.t[-1])]:
-        axes.axvline(start, color=GRID, linewidth=0.8, zorder=0)
-    if len(finite) and np.ptp(finite) > 0.0:
-        low, high, span = finite.min(), finite.max(), np.ptp(finite)
-        bottom, top = axes.get_ylim()  # a nominal model that runs away must not flatten what was recorded
-        axes.set_ylim(max(bottom, scale.factor * (low - 0.75 * span)), min(top, scale.factor * (high + 0.75 * span)))
-    title = f"{_with_unit(column, scale.unit)}   error here {_change(trace, column, unit)}"
-    axes.set_title(title, loc="left", fontsize=10, color=MUTED, parse_math=False)
-
-
-def _change(trace: Trace, column: str, unit: str) -> str:
-    """Errors of both models in one trace, e.g. "21.0 to 2.10 mm" with an arrow."""
-    nominal = prediction_error(trace, trace.nominal)[column]
-    completed = prediction_error(trace, trace.completed)[column]
-    scale = scale_for([nominal, completed], unit)
-    before, after = significant(scale.factor * nominal), significant(scale.factor * completed)
-    return f"{before} \N{RIGHTWARDS ARROW} {after} {scale.unit}"
-
-
-def _draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) -> None:
-    _quiet(axes)
-    finite = [height if np.isfinite(height) else 0.0 for height in heights]
-    bars = axes.bar(("nominal", "completed", "noise\nfloor"), finite, color=(NOMINAL, COMPLETED, FLOOR), width=0.72)
-    axes.bar_label(bars, [significant(height) for height in heights], padding=2, fontsize=9)
-    if wants_logarithm(finite):
-        axes.set_yscale("log")
-        title = f"{title}, log scale"
-    axes.margins(y=0.18)
-    axes.grid(visible=False)
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(left=False, labelleft=False, which="both")
-    axes.set_title(title, loc="left", fontsize=10, color=MUTED, parse_math=False)
-
-
-def _quiet(axes: Axes) -> None:
-    """Few lines, so that the curves stand out."""
-    axes.grid(color=GRID, linewidth=0.8)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color("#c8cdd3")
-    axes.tick_params(color="#c8cdd3", labelsize=9)
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
-
-
-def _png(figure: Figure) -> bytes:
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=DPI, facecolor="white")
-    return image.getvalue()
+    write_whole(path, png(figure))

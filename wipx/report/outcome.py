@@ -1,13 +1,44 @@
-"""What an identification achieved, in figures and words that page, tables and figures share."""
+"""What a completed model achieved, in figures and words that page, tables and figures share."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
-from wipx.core.results import Estimate, FitErrors, IdentificationResult
+from wipx.core.results import Estimate, FitErrors, IdentificationResult, Trace
 from wipx.report.numbers import Scale, compact, scale_for, significant
 
 HELD_OUT = "held-out"
 FIT = "fit"
+
+
+class ModelComparison(Protocol):
+    """What identification and diagnosis both leave: predictions by the nominal and the completed model."""
+
+    @property
+    def title(self) -> str:
+        """Of the page."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit by column."""
+        ...
+
+    @property
+    def fit(self) -> FitErrors:
+        """Errors on the recordings that were fitted."""
+        ...
+
+    @property
+    def held_out(self) -> FitErrors | None:
+        """Errors on the others; None where there are none."""
+        ...
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """Recordings beside predictions."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +89,7 @@ class SignalErrors:
         return not self.completed <= 1.02 * self.nominal
 
 
-def signal_errors(result: IdentificationResult) -> tuple[SignalErrors, ...]:
+def signal_errors(result: ModelComparison) -> tuple[SignalErrors, ...]:
     """Errors of every signal, held-out recordings first; a signal has one unit throughout."""
     parts = _parts(result)
     rows = []
@@ -70,27 +101,32 @@ def signal_errors(result: IdentificationResult) -> tuple[SignalErrors, ...]:
     return tuple(rows)
 
 
-def error_scale(result: IdentificationResult, signal: str) -> Scale:
+def error_scale(result: ModelComparison, signal: str) -> Scale:
     """The unit in which errors of a signal are shown."""
     sizes = [size.get(signal, math.nan) for _, part in _parts(result) for size in (part.nominal, part.completed)]
     return scale_for(sizes, result.units.get(signal, ""))
 
 
-def judged_errors(result: IdentificationResult) -> tuple[SignalErrors, ...]:
+def judged_errors(result: ModelComparison) -> tuple[SignalErrors, ...]:
     """Errors that the outcome is judged by: on held-out recordings where there are any."""
     rows = signal_errors(result)
     return tuple(row for row in rows if row.recordings == rows[0].recordings)
 
 
-def judged_fit(result: IdentificationResult) -> FitErrors:
+def judged_fit(result: ModelComparison) -> FitErrors:
     """The errors behind `judged_errors`."""
-    return result.fit if result.held_out is None else result.held_out
+    return held_out_errors(result) or result.fit
 
 
-def headline(result: IdentificationResult, arrow: str = "->") -> str:
+def held_out_errors(result: ModelComparison) -> FitErrors | None:
+    """Errors on held-out recordings; None where no window of any was predicted."""
+    return result.held_out if result.held_out is not None and result.held_out.windows > 0 else None
+
+
+def headline(result: ModelComparison, arrow: str = "->") -> str:
     """The outcome in one sentence with its figures."""
     rows = judged_errors(result)
-    where = "held-out recordings" if result.held_out else "the fitted recordings (none were held out)"
+    where = "held-out recordings" if held_out_errors(result) else "the fitted recordings (none were held out)"
     changes = ", ".join(
         f"{row.signal} {significant(row.nominal)} {arrow} {significant(row.completed)} {row.scale.unit}" for row in rows
     )
@@ -124,9 +160,9 @@ def search_summary(result: IdentificationResult) -> str:
     return f"{history.optimizer}: {spent}, stopped: {history.stopped}"
 
 
-def _parts(result: IdentificationResult) -> tuple[tuple[str, FitErrors], ...]:
-    fit = (FIT, result.fit)
-    return (fit,) if result.held_out is None else ((HELD_OUT, result.held_out), fit)
+def _parts(result: ModelComparison) -> tuple[tuple[str, FitErrors], ...]:
+    fit, held_out = (FIT, result.fit), held_out_errors(result)
+    return (fit,) if held_out is None else ((HELD_OUT, held_out), fit)
 
 
 def _factor(ratio: float) -> str:

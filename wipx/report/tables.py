@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from wipx.core.results import IdentificationResult
+from wipx.core.results import Estimate, IdentificationResult
 from wipx.report.numbers import MISSING, compact, significant, with_interval
-from wipx.report.outcome import headline, remark, search_summary, signal_errors
+from wipx.report.outcome import ModelComparison, headline, remark, search_summary, signal_errors
 
 ERRORS_HEAD = ("recordings", "signal", "unit", "nominal", "completed", "noise floor", "change")
 ESTIMATES_HEAD = ("parameter", "meaning", "unit", "before", "value", "95 % interval", "remark")
@@ -17,7 +17,7 @@ def errors_table(result: IdentificationResult) -> str:
 
 def estimates_table(result: IdentificationResult) -> str:
     """Identified parameters with their 95 % intervals as a Markdown table."""
-    return _markdown(ESTIMATES_HEAD, estimate_rows(result), numbers=(3, 4))
+    return _markdown(ESTIMATES_HEAD, estimate_rows(result.estimates), numbers=(3, 4))
 
 
 def summary(result: IdentificationResult) -> str:
@@ -25,14 +25,14 @@ def summary(result: IdentificationResult) -> str:
     lines = [f"{result.title} ({result.plant})", headline(result), ""]
     lines += _aligned(ERRORS_HEAD, error_rows(result), numbers=(3, 4, 5))
     if result.estimates:
-        rows = [(name, *rest) for name, _, *rest in estimate_rows(result)]
+        rows = [(name, *rest) for name, _, *rest in estimate_rows(result.estimates)]
         lines += ["", *_aligned((ESTIMATES_HEAD[0], *ESTIMATES_HEAD[2:]), rows, numbers=(2, 3))]
     lines += ["", search_summary(result)]
     lines += [f"note: {note}" for note in result.notes]
     return "\n".join(lines)
 
 
-def error_rows(result: IdentificationResult) -> list[tuple[str, ...]]:
+def error_rows(result: ModelComparison) -> list[tuple[str, ...]]:
     """Cells under `ERRORS_HEAD`."""
     return [
         (
@@ -48,10 +48,10 @@ def error_rows(result: IdentificationResult) -> list[tuple[str, ...]]:
     ]
 
 
-def estimate_rows(result: IdentificationResult) -> list[tuple[str, ...]]:
+def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
     """Cells under `ESTIMATES_HEAD`, in SI units so that they can be compared with a model file."""
     rows = []
-    for estimate in result.estimates:
+    for estimate in estimates:
         shown = with_interval(estimate.value, estimate.low, estimate.high)
         before = compact(estimate.nominal)
         cells = (estimate.name, estimate.meaning, estimate.unit, before, shown.value, shown.ends, remark(estimate))

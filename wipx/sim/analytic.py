@@ -23,6 +23,7 @@ from wipx.sim.rows import W
 
 LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
 NO_FEEDBACK = np.zeros((1, 4, 1))
+NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,22 @@ class StateFeedback:
 
 
 @dataclass(frozen=True)
+class Observer:
+    """Corrects the state at every row by gains times recorded minus shown.
+
+    Attributes:
+        recorded: Coordinates, then rates, shape (K + 1, 2 joints, R).
+        gains: Shape (groups, K + 1, R, 2 joints, 2 joints), from channels to states; zero where nothing
+            was measured.
+        group: Which of the gains each model has, shape (P,).
+    """
+
+    recorded: np.ndarray
+    gains: np.ndarray
+    group: np.ndarray
+
+
+@dataclass(frozen=True)
 class AnalyticSimulator:
     """The compiled simulator; `wipx.sim.kernel` holds its physics.
 
@@ -86,6 +103,20 @@ class AnalyticSimulator:
         run = _Run(self, batch, inputs)
         states = run.states(initial)
         run.advance(states, 0, run.rows)
+        return run.rollouts(inputs.commands[:, :, None, :])
+
+    def follow(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, observer: Observer) -> Rollouts:
+        """Replay that an observer keeps close to the recordings: what every model shows one row ahead.
+
+        Args:
+            batch: P models.
+            inputs: R recordings.
+            initial: As in `replay`.
+            observer: Corrects the state at every row, after it is shown.
+        """
+        run = _Run(self, batch, inputs)
+        states = run.states(initial)
+        run.advance(states, 0, run.rows, observer=observer)
         return run.rollouts(inputs.commands[:, :, None, :])
 
     def close_loop(
@@ -179,7 +210,7 @@ class _Run:
         ).reshape(len(self.pattern), self.lanes)
         return states
 
-    def advance(self, states, first_row, last_row, commands=None, feedback=None) -> None:
+    def advance(self, states, first_row, last_row, commands=None, feedback=None, observer=None) -> None:
         """Simulate rows; `commands` (K, 2, lanes) are per lane, otherwise the inputs' own are replayed."""
         per_lane = commands is not None
         if commands is None:
@@ -188,6 +219,7 @@ class _Run:
             commands[:, driven] = self.inputs.commands
         closed = feedback is not None
         gains, references, noise, settings = feedback or (np.zeros((2, 4)), NO_FEEDBACK, NO_FEEDBACK, np.zeros(2))
+        measured, corrections, group = self._observed(observer)
 
         def work(begin: int, end: int) -> None:
             rollout(
@@ -205,6 +237,10 @@ class _Run:
                 references,
                 noise,
                 settings,
+                observer is not None,
+                measured,
+                corrections,
+                group,
                 self.past,
                 self.out,
                 first_row,
@@ -219,6 +255,16 @@ class _Run:
             return
         with ThreadPoolExecutor(len(bounds) - 1) as pool:
             list(pool.map(work, bounds[:-1], bounds[1:]))
+
+    def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Recorded signals, gains and groups in the kernel's layout."""
+        if observer is None:
+            return NO_FEEDBACK, NO_OBSERVER, np.zeros(1, dtype=np.int64)
+        measured = np.zeros((self.rows + 1, 4, self.inputs.windows))
+        measured[:, self.pattern] = observer.recorded
+        gains = np.zeros((*observer.gains.shape[:3], 4, 4))
+        gains[..., np.array(self.pattern)[:, None], self.pattern] = observer.gains
+        return measured, gains, observer.group.astype(np.int64)
 
     def _shares(self, first_row: int, last_row: int) -> list[int]:
         """Lane bounds of the threads, in whole blocks."""

@@ -19,7 +19,7 @@ from wipx.sim.body import double_body, load_body, payload_event, spring, wip_bod
 from wipx.sim.cache import cached
 from wipx.sim.joints import levels, move, smooth_friction
 from wipx.sim.rows import W
-from wipx.sim.sensors import feedback, record
+from wipx.sim.sensors import correct, feedback, record
 
 
 @law
@@ -139,6 +139,10 @@ def rollout(
     references,
     noise,
     settings,
+    follows,
+    measured,
+    observer,
+    group,
     past,
     out,
     first_row,
@@ -163,6 +167,10 @@ def rollout(
         references: Shape (K, 4, R).
         noise: Measurement noise of the loop, shape (K, 4, lanes); closed loop only.
         settings: Time constant of the rate filter [s] (negative: rates are measured), limit of the command.
+        follows: Whether an observer corrects the state at every row.
+        measured: What it sees, shape (K + 1, 4, R).
+        observer: Its gains, shape (groups, K + 1, R, 4, 4).
+        group: Which of them each model has, shape (P,).
         past: True coordinates and rates for sensor delays, shape (K + 1, 4, lanes); else (1, 4, 1).
         out: Coordinates as recorded, then true rates, shape (K + 1, 4, lanes).
         first_row: Row at which the states stand.
@@ -189,6 +197,8 @@ def rollout(
         load_body(S)
         for k in range(first_row, last_row):
             record(S, on, past, t_rows, lanes, k, out, lane0, count)
+            if follows:
+                correct(S, on, past, lanes, k, lane0, count, measured, observer, group)
             if closed:
                 feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:

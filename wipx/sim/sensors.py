@@ -1,4 +1,4 @@
-"""What the sensors show at a row of the log, and the feedback computed from it; compiled."""
+"""What the sensors show at a row of the log, the feedback computed from it, and an observer's correction; compiled."""
 
 from wipx.core.law import clip, law, maximum, minimum
 from wipx.sim import rows as R
@@ -78,3 +78,28 @@ def feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise
             u -= k3 * (S[R.MEASURED_RATE1 * W + w] - S[R.REFERENCE_RATE1 * W + w])
             S[(R.COMMAND + c) * W + w] = clip(u, -limit, limit)
         u_rows[k, c, lane0 : lane0 + count] = S[(R.COMMAND + c) * W : (R.COMMAND + c) * W + count]
+
+
+@law
+def correct(S, on, past, lanes, k, lane0, count, measured, gains, group):
+    """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
+
+    Args:
+        measured: Recorded coordinates and rates, shape (K + 1, 4, R).
+        gains: Shape (groups, K + 1, R, 4 states, 4 channels); zero where nothing was measured.
+        group: Which gains each model has, shape (P,).
+    """
+    windows = measured.shape[2]
+    for w in range(count):
+        window = lanes[0, w]
+        gain = gains[group[(lane0 + w) // windows], k, window]
+        e0 = measured[k, 0, window] - S[R.SHOWN * W + w]
+        e1 = measured[k, 1, window] - S[R.SHOWN1 * W + w]
+        e2 = measured[k, 2, window] - S[R.V * W + w]
+        e3 = measured[k, 3, window] - S[R.V1 * W + w]
+        for i in range(4):
+            S[(R.Q + i) * W + w] += gain[i, 0] * e0 + gain[i, 1] * e1 + gain[i, 2] * e2 + gain[i, 3] * e3
+    if on[R.ON_SENSOR_DELAY]:
+        for i in range(4):
+            for w in range(count):
+                past[k, i, lane0 + w] = S[(R.Q + i) * W + w]

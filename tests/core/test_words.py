@@ -1,0 +1,38 @@
+"""Every effect has words that a person understands."""
+
+import pytest
+
+from wipx.core.plant import PLANTS
+from wipx.core.words import effect_in_words, has_words, site_in_words
+from wipx.effects.catalogue import kinds, vocabulary
+
+
+def test_words_name_the_physics_and_the_place():
+    assert effect_in_words("translation/coulomb", "wip") == "Coulomb friction on the rail joint"
+    assert effect_in_words("sensor_theta/delay", "wip") == "delay of the pitch sensor"
+    assert effect_in_words("joint2/viscous", "double_pendulum") == "viscous friction on joint 2"
+
+
+def test_several_effects_are_joined_by_and():
+    words = effect_in_words("pitch/viscous + actuator/delay", "pendulum")
+    assert words == "viscous friction on the pendulum's joint and delay of the actuator"
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_every_kind_of_effect_has_words(kind: str):
+    assert has_words(kind)
+
+
+@pytest.mark.parametrize("plant", PLANTS.values(), ids=list(PLANTS))
+def test_effects_of_a_plant_have_words_of_their_own(plant):
+    words = [effect_in_words(name, plant.kind) for name in vocabulary(plant)]
+    assert len(set(words)) == len(words)
+
+
+@pytest.mark.parametrize("plant", PLANTS.values(), ids=list(PLANTS))
+def test_every_site_has_words(plant):
+    assert all("_" not in site_in_words(site, plant.kind) for site in plant.sites)
+
+
+def test_an_unknown_kind_keeps_its_name():
+    assert effect_in_words("pitch/some_thing", "wip") == "some thing of the pitch joint"

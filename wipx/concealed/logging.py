@@ -1,0 +1,90 @@
+"""What is recorded of a run: rows slower than the controller, mean commands, rounded numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.concealed.engine import simulate
+from wipx.concealed.physics import DRIVEN, MOVING
+from wipx.concealed.robots import Robot
+from wipx.concealed.scenario import LIMITS, LogSettings, Scenario
+from wipx.core.plant import PLANTS, RATE_OF
+
+PLACES = 5  # decimals of times, coordinates and rates
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run as it was recorded.
+
+    Attributes:
+        columns: Columns of contract section 1 with what is recorded, each of shape (rows,) [SI].
+        exact: The coordinates without noise and resolution, by column, on the same rows [SI].
+        rates: True rates by coordinate's column, on the same rows [m/s, rad/s].
+        fell: Whether the robot left its limits; the columns are empty then.
+    """
+
+    columns: Mapping[str, np.ndarray]
+    exact: Mapping[str, np.ndarray]
+    rates: Mapping[str, np.ndarray]
+    fell: bool
+
+
+def record(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSettings) -> Run:
+    """Drive a robot through a scenario and log it.
+
+    Args:
+        robot: Whose controller it is.
+        truth: Record of the real robot, shape (1,), of `physics.physics`.
+        scenario: The run.
+        settings: Of the log.
+    """
+    limit = np.array(LIMITS.get(robot.kind, (2.0, 0.5)))
+    gyro, resolution = np.array(robot.gyro), np.array(settings.resolution)
+    reached, shown, _q, rates, commands, forces = simulate(
+        truth[0],
+        scenario.start,
+        scenario.instants,
+        scenario.reference,
+        scenario.extra,
+        scenario.noise,
+        scenario.rate_noise,
+        gyro,
+        resolution,
+        robot.gains,
+        robot.cutoff,
+        limit,
+    )
+    if reached < len(scenario.instants) - 1:
+        return Run({}, {}, {}, fell=True)
+    plant, rows = PLANTS[robot.kind], scenario.rows
+    columns = {"t": scenario.instants[rows]}
+    exact, moving = {}, {}
+    for joint, name in zip(MOVING[robot.kind], plant.coordinates, strict=True):
+        columns[name] = shown[rows, joint]
+        exact[name] = shown[rows, joint] - scenario.noise[rows, joint]
+        moving[name] = rates[rows, joint]
+    for joint, name in zip(MOVING[robot.kind], plant.coordinates, strict=True):
+        if joint in settings.rates:
+            columns[RATE_OF[name]] = rates[rows, joint] + scenario.rate_noise[rows, joint]
+    columns = {name: np.round(values, PLACES) + 0.0 for name, values in columns.items()}
+    for joint, name in zip(DRIVEN[robot.kind], plant.commands, strict=True):
+        columns[name] = _rounded(_means(commands[:, joint], scenario))
+        if settings.force_noise is not None:
+            mean = _means(forces[:, joint], scenario)
+            columns[f"{name}_measured"] = _rounded(mean + np.std(commands[:, joint]) * scenario.force_noise)
+    return Run(columns, exact, moving, fell=False)
+
+
+def _means(values: np.ndarray, scenario: Scenario) -> np.ndarray:
+    """Mean over time of held values from each row to the next, shape (rows,)."""
+    steps = np.diff(scenario.instants)[: scenario.end]
+    sums = np.add.reduceat(values[: scenario.end] * steps, scenario.rows)
+    return sums / np.add.reduceat(steps, scenario.rows)
+
+
+def _rounded(values: np.ndarray) -> np.ndarray:
+    """Values with about five significant digits of their largest."""
+    digits = 4 - int(np.floor(np.log10(max(float(np.abs(values).max()), 1e-9))))
+    return np.round(values, min(max(digits, 2), 8)) + 0.0

@@ -1,0 +1,298 @@
+"""What a diagnosis leaves: the type that `wipx.diagnose` returns, tasks write and reports read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from wipx.core.model import Model
+from wipx.core.results import Estimate, FitErrors, Trace
+
+Verdict = Literal["consistent", "mismatch", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A force over one signal, with what the recordings themselves say of it.
+
+    Attributes:
+        title: What it shows, e.g. "force on the wheel/rail joint".
+        signal: Column or rate on the abscissa, e.g. "x_dot".
+        signal_unit: Its SI unit.
+        force_unit: SI unit of the ordinate.
+        at: Abscissa of the law, shape (N,).
+        law: The law there, shape (N,) [force_unit].
+        bins: Abscissa of the data's own estimate, shape (B,).
+        force: Force that the recordings need beside the rest of the model, mean of each bin, shape (B,).
+        spread: Standard error of each mean, shape (B,).
+    """
+
+    title: str
+    signal: str
+    signal_unit: str
+    force_unit: str
+    at: np.ndarray
+    law: np.ndarray
+    bins: np.ndarray
+    force: np.ndarray
+    spread: np.ndarray
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another effect in the place of one that was found.
+
+    Attributes:
+        name: "site/kind".
+        separation: How far the recordings are from it, in standard deviations.
+        parameters: Its values if it were the one, by symbol [SI].
+    """
+
+    name: str
+    separation: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """Physics that was left out.
+
+    Attributes:
+        name: "site/kind".
+        law: Its equation.
+        source: Paper or book.
+        beyond: Whether the vocabulary of contract section 3 lacks it.
+        parameters: Its numbers with 95 % intervals.
+        equivalent: Effects that these recordings cannot tell from it.
+        rivals: Other effects in its place, the closest first; `equivalent` among them.
+        log_evidence_gain: Log-likelihood that it adds, in nats, beside the other effects.
+        heldout_gain: Share of the squared prediction error on recordings it was not fitted to that it removes.
+        present_probability: Of this name among those that could stand in its place.
+        share: Of the explained mismatch.
+        curve: Its law on the data; None where a curve over one signal does not show it.
+    """
+
+    name: str
+    law: str
+    source: str
+    beyond: bool
+    parameters: tuple[Estimate, ...]
+    equivalent: tuple[str, ...]
+    rivals: tuple[Alternative, ...]
+    log_evidence_gain: float
+    heldout_gain: float
+    present_probability: float
+    share: float
+    curve: Curve | None
+
+
+@dataclass(frozen=True)
+class Region:
+    """An interval of a signal that holds much of the mismatch.
+
+    Attributes:
+        signal: Column, rate or command.
+        low: Lower end [SI].
+        high: Upper end.
+        share: Of the excess error that lies inside.
+    """
+
+    signal: str
+    low: float
+    high: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Period:
+    """A stretch of time that holds much of the mismatch of a recording.
+
+    Attributes:
+        recording: Its name.
+        low: Begin [s].
+        high: End [s].
+        share: Of that recording's excess error that lies inside.
+    """
+
+    recording: str
+    low: float
+    high: float
+    share: float
+
+
+@dataclass(frozen=True)
+class ErrorMap:
+    """Where the nominal model is wrong: excess of its squared innovations over what the completed model leaves.
+
+    Attributes:
+        signals: Names of abscissa and ordinate.
+        units: Their units.
+        edges: Bin edges of both, shapes (A + 1,) and (B + 1,).
+        excess: Mean excess per row and bin, shape (A, B) [nats]; NaN where the robot never was.
+        runs: Names of the recordings.
+        times: Middle of the time bins of each recording [s].
+        along: Mean excess per row in these bins, one array per recording [nats].
+    """
+
+    signals: tuple[str, str]
+    units: tuple[str, str]
+    edges: tuple[np.ndarray, np.ndarray]
+    excess: np.ndarray
+    runs: tuple[str, ...]
+    times: tuple[np.ndarray, ...]
+    along: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the mismatch is.
+
+    Attributes:
+        sites: Share by site; they sum to one, empty where nothing is missing.
+        regions: Intervals of the state space.
+        times: Stretches of time.
+        map: For the picture; None where nothing is missing.
+    """
+
+    sites: Mapping[str, float]
+    regions: tuple[Region, ...]
+    times: tuple[Period, ...]
+    map: ErrorMap | None
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What the named effects leave over.
+
+    Attributes:
+        significant: Whether something is.
+        p_value: Of the strongest leftover if nothing were left, corrected for the number of places looked at.
+        site: Joint at which it acts; None where nothing is significant.
+        shape: What it looks like, in words, e.g. "a force over x_dot"; empty where nothing is significant.
+        resembles: Effects beyond the vocabulary that would explain it.
+        curve: The nonparametric force that stands in for it; None without one.
+    """
+
+    significant: bool
+    p_value: float
+    site: str | None
+    shape: str
+    resembles: tuple[str, ...]
+    curve: Curve | None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect, or several, that was considered.
+
+    Attributes:
+        name: "site/kind", joined by " + ".
+        gain: Log-likelihood over the model it was compared with, in nats.
+        chosen: Whether it is part of the answer.
+        reason: Why or why not, in words.
+    """
+
+    name: str
+    gain: float
+    chosen: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Bound:
+    """How large an effect that was not found could be at most.
+
+    Attributes:
+        name: "site/kind.symbol" of the number that measures it.
+        low: Lower end of the 95 % interval [unit].
+        high: Upper end.
+        unit: SI unit.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An excitation, and how well it would tell apart what these recordings leave open.
+
+    Attributes:
+        name: Of the menu, e.g. "multisine".
+        how: What a person does, one sentence.
+        separation: Standard deviations by which it would separate the open question.
+    """
+
+    name: str
+    how: str
+    separation: float
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to record next.
+
+    Attributes:
+        question: What is open, one sentence.
+        best: The excitation that settles it best.
+        menu: All that were simulated, the best first.
+        reference: Columns of the file that the controller can run: t and x_ref or theta_ref, or u; empty where
+            the experiment needs none.
+    """
+
+    question: str
+    best: Experiment
+    menu: tuple[Experiment, ...]
+    reference: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer: is physics missing, where, which, how much, and what is still open.
+
+    Attributes:
+        title: Of the page, e.g. the dataset's name.
+        source: Folder of the recordings.
+        units: SI unit by column, rates and commands included.
+        verdict: Contract section 5.
+        sentence: The answer in one sentence.
+        nominal: The model before.
+        model: The completed model.
+        effects: What was left out, the largest first.
+        corrected: Uncertain nominal numbers and what they became.
+        location: Where the mismatch is.
+        fit: Prediction errors on the recordings that were fitted.
+        held_out: The same, each recording predicted by a model that was fitted to the others.
+        unexplained: What is left over.
+        candidates: What was considered, in the order of the search.
+        bounds: How large effects that were not found could be.
+        weak: What these recordings cannot say, one sentence each.
+        next_experiment: What to record next; None where nothing is open or the loop cannot be simulated.
+        traces: Recordings beside predictions, held-out ones first.
+        notes: Warnings a reader must know, one sentence each.
+        seconds: That the diagnosis took.
+    """
+
+    title: str
+    source: str
+    units: Mapping[str, str]
+    verdict: Verdict
+    sentence: str
+    nominal: Model
+    model: Model
+    effects: tuple[FoundEffect, ...]
+    corrected: tuple[Estimate, ...]
+    location: Location
+    fit: FitErrors
+    held_out: FitErrors
+    unexplained: Unexplained
+    candidates: tuple[Candidate, ...]
+    bounds: tuple[Bound, ...]
+    weak: tuple[str, ...]
+    next_experiment: NextExperiment | None
+    traces: tuple[Trace, ...]
+    notes: tuple[str, ...]
+    seconds: float

@@ -1,0 +1,218 @@
+"""Maximum likelihood: the parameters and the noise with which a hypothesis explains recordings best.
+
+Prediction-error method (Ljung 1999, System Identification, ch. 7): Levenberg-Marquardt steps on white
+innovations with observer and colour held fixed, in turn with a search over the noise levels.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wipx.core.model import ModelBatch
+from wipx.diagnose.follower import Follower
+from wipx.diagnose.hypothesis import Hypothesis
+from wipx.diagnose.observer import NoiseLevels
+from wipx.diagnose.whiteness import Colour, colour_of, whitened
+from wipx.identify.parameter_space import ParameterSpace
+
+FIRST_STEP = 1e-4  # of the search interval, for the first slopes
+LARGEST_STEP = 0.02
+SECANT = 0.3  # standard deviations over which later slopes are taken
+DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
+SETTLED = 0.05  # nats per step at which a refinement ends
+LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
+LEVEL_RANGE = 14.0  # of the same, about the first guess
+POLISHED = 0.5  # nats at which alternating ends
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hypothesis fitted to recordings.
+
+    Attributes:
+        hypothesis: With its best values.
+        levels: Noise levels.
+        colour: Of its innovations.
+        white: White innovations, shape (N, m).
+        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N m + priors, D).
+        log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
+    """
+
+    hypothesis: Hypothesis
+    levels: NoiseLevels
+    colour: Colour
+    white: np.ndarray
+    jacobian: np.ndarray
+    log_likelihood: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the hypothesis."""
+        return self.hypothesis.effects
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """Inverse covariance of the position in the cube, shape (D, D)."""
+        return self.jacobian.T @ self.jacobian
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """Fits hypotheses to the recordings of a follower."""
+
+    follower: Follower
+
+    def fit(self, hypothesis: Hypothesis, levels: NoiseLevels, *, steps: int = 6) -> Fit:
+        """The best values at given noise levels, from the hypothesis' own values on.
+
+        Args:
+            hypothesis: Where to start.
+            levels: Noise.
+            steps: Levenberg-Marquardt steps at most.
+        """
+        here = self._evaluate(hypothesis, levels)
+        if not len(hypothesis.cube):
+            return here
+        size = np.full(len(hypothesis.cube), FIRST_STEP)
+        for _ in range(steps):
+            jacobian = self._slopes(here, size)
+            size = np.clip(SECANT / np.sqrt(np.maximum(np.sum(jacobian**2, axis=0), 1e-12)), 1e-6, LARGEST_STEP)
+            here = replace(here, jacobian=jacobian)
+            there = self._best_of(here, self._proposals(here))
+            gain = there.log_likelihood - here.log_likelihood
+            if gain > 0.0:
+                here = there
+            if gain < SETTLED:
+                break
+        return replace(here, jacobian=self._slopes(here, size))
+
+    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+        """Noise levels and values in turn until neither gains more."""
+        for _ in range(rounds):
+            before = fit.log_likelihood
+            fit = self.fit(fit.hypothesis, self.levels_of(fit))
+            if fit.log_likelihood - before < POLISHED:
+                break
+        return fit
+
+    def levels_of(self, fit: Fit) -> NoiseLevels:
+        """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
+
+        Their common factor does not matter: the last sensor's level is kept.
+        """
+        joints = len(fit.levels.force)
+        best = np.log(np.concatenate([fit.levels.force, fit.levels.sensor]))
+        centre = best.copy()
+        likelihood = self._likelihoods(fit.hypothesis, [_levels(best, joints)])[0]
+        for step in LEVEL_STEPS:
+            move = np.zeros_like(best)
+            for _ in range(12):
+                trials = [best + sign * step * axis for axis in np.eye(len(best))[:-1] for sign in (-1.0, 1.0)]
+                if np.count_nonzero(move) > 1:
+                    trials.append(best + move)
+                trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
+                found = np.array(self._likelihoods(fit.hypothesis, [_levels(trial, joints) for trial in trials]))
+                gains = found[: 2 * (len(best) - 1)] - likelihood
+                move = _joined(gains, step, len(best))
+                if found.max() <= likelihood + 0.1 * SETTLED:
+                    break
+                best, likelihood = trials[int(found.argmax())], float(found.max())
+        return _levels(best, joints)
+
+    def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
+        """White innovations of other models, with observer and colour of a fit, shape (P, N m)."""
+        gains = self.follower.gains(fit.levels, fit.hypothesis.model)
+        innovations = self.follower.innovations(batch, (gains,), np.zeros(batch.size, dtype=np.int64))
+        return whitened(innovations, fit.colour, self.follower.log).reshape(batch.size, -1)
+
+    def _evaluate(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
+        gains = self.follower.gains(levels, hypothesis.model)
+        innovations = self._innovations(hypothesis, hypothesis.cube[None], levels)
+        return self._measured(hypothesis, levels, innovations[0], _log_determinant(gains.whitening, self.follower.log))
+
+    def _measured(self, hypothesis: Hypothesis, levels: NoiseLevels, innovations: np.ndarray, scale: float) -> Fit:
+        log = self.follower.log
+        colour = colour_of(innovations, log)
+        white = whitened(innovations[None], colour, log)[0]
+        priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
+        likelihood = scale + colour.log_likelihood - 0.5 * float(priors @ priors)
+        slopes = np.zeros((white.size + len(priors), len(hypothesis.cube)))
+        return Fit(hypothesis, levels, colour, white, slopes, likelihood)
+
+    def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
+        gains = self.follower.gains(levels, hypothesis.model)
+        batch = hypothesis.space.batch(cubes)
+        return self.follower.innovations(batch, (gains,), np.zeros(len(cubes), dtype=np.int64))
+
+    def _slopes(self, fit: Fit, size: np.ndarray) -> np.ndarray:
+        """Slopes of white innovations and priors, by differences away from the nearer bound."""
+        cube, space = fit.hypothesis.cube, fit.hypothesis.space
+        signed = np.where(cube > 0.5, -size, size)
+        cubes = np.concatenate([cube[None], cube + np.diag(signed)])
+        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
+        white = whitened(innovations, fit.colour, self.follower.log).reshape(len(cubes), -1)
+        rows = np.concatenate([white, space.prior_residuals(cubes)], axis=1)
+        return ((rows[1:] - rows[0]) / signed[:, None]).T
+
+    def _proposals(self, fit: Fit) -> np.ndarray:
+        """Positions to try next, one for each damping, within the cube."""
+        cube = fit.hypothesis.cube
+        residual = np.concatenate([fit.white.ravel(), fit.hypothesis.space.prior_residuals(cube)[0]])
+        slope = fit.jacobian.T @ residual
+        held = ((cube <= 0.0) & (slope > 0.0)) | ((cube >= 1.0) & (slope < 0.0))
+        free = np.flatnonzero(~held)
+        proposals = np.repeat(cube[None], len(DAMPINGS), axis=0)
+        if not len(free):
+            return proposals[:1]
+        normal = fit.information[np.ix_(free, free)]
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+        scaled = normal / np.outer(scale, scale)
+        for i, damping in enumerate(DAMPINGS):
+            step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), slope[free] / scale) / scale
+            proposals[i, free] -= step
+        return np.clip(proposals, 0.0, 1.0)
+
+    def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:
+        gains = self.follower.gains(fit.levels, fit.hypothesis.model)
+        scale = _log_determinant(gains.whitening, self.follower.log)
+        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
+        fits = [
+            self._measured(fit.hypothesis.at(cube), fit.levels, each, scale)
+            for cube, each in zip(cubes, innovations, strict=True)
+        ]
+        return max(fits, key=lambda found: found.log_likelihood)
+
+    def _likelihoods(self, hypothesis: Hypothesis, levels: list[NoiseLevels]) -> list[float]:
+        """Log-likelihoods of one model with several noise levels."""
+        log = self.follower.log
+        gains = tuple(self.follower.gains(level, hypothesis.model) for level in levels)
+        count = len(levels)
+        batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
+        innovations = self.follower.innovations(batch, gains, np.arange(count))
+        priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
+        return [
+            _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
+            for g, each in zip(gains, innovations, strict=True)
+        ]
+
+
+def _levels(logarithms: np.ndarray, joints: int) -> NoiseLevels:
+    values = np.exp(logarithms)
+    return NoiseLevels(values[:joints], values[joints:])
+
+
+def _joined(gains: np.ndarray, step: float, count: int) -> np.ndarray:
+    """All single moves that gained, made at once; gains in pairs (-, +) for each level but the last."""
+    move = np.zeros(count)
+    for i in range(count - 1):
+        down, up = gains[2 * i], gains[2 * i + 1]
+        if max(down, up) > 0.0:
+            move[i] = step if up > down else -step
+    return move
+
+
+def _log_determinant(whitening: np.ndarray, log) -> float:
+    """Sum of log det of the whitening over the rows that count."""
+    diagonal = np.einsum("krcc->krc", whitening)[log.counted]
+    return float(np.log(diagonal).sum())

@@ -1,0 +1,74 @@
+"""A hypothesis: the nominal model, the effects that are supposed to be missing, and what may vary."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.model import Model
+from wipx.core.parameters import Scales
+from wipx.effects.catalogue import effect_of
+from wipx.identify.parameter_space import ParameterSpace, parameter_space
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all hypotheses about a robot share.
+
+    Attributes:
+        nominal: What its owner believes.
+        uncertainty: Relative standard deviation of nominal numbers that are not exact.
+        scales: Characteristic sizes by site.
+    """
+
+    nominal: Model
+    uncertainty: Mapping[str, float]
+    scales: Mapping[str, Scales]
+
+    def space(self, effects: tuple[str, ...]) -> ParameterSpace:
+        """The numbers that vary when these effects are added: theirs, and the uncertain nominal ones."""
+        plant = self.nominal.plant
+        prepared = self.nominal.with_effects({name: effect_of(name, plant).neutral for name in effects})
+        if not effects and not self.uncertainty:
+            return ParameterSpace(prepared, ())
+        return parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects added to the nominal model, with values.
+
+    Attributes:
+        effects: Names "site/kind", in the order in which they were added.
+        space: The numbers that vary.
+        cube: Their values, as a position in the unit cube, shape (D,).
+    """
+
+    effects: tuple[str, ...]
+    space: ParameterSpace
+    cube: np.ndarray
+
+    @classmethod
+    def of(cls, setting: Setting, effects: tuple[str, ...], values: Mapping[str, float]) -> "Hypothesis":
+        """Effects at given values; numbers that are not named start from their usual values."""
+        space = setting.space(effects)
+        start = np.array([values.get(p.name, p.start) for p in space.free])
+        return cls(effects, space, space.to_cube(start))
+
+    @property
+    def model(self) -> Model:
+        """The nominal model with these effects."""
+        return self.space.model.with_values(self.values)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every number that varies [SI]."""
+        return dict(zip(self.space.names, self.space.to_values(self.cube).tolist(), strict=True))
+
+    def at(self, cube: np.ndarray) -> "Hypothesis":
+        """The same effects with other values."""
+        return replace(self, cube=cube)
+
+    def parameters_of(self, effect: str) -> list[int]:
+        """Which of the numbers belong to an effect."""
+        return [i for i, name in enumerate(self.space.names) if name.startswith(f"{effect}.")]

@@ -1,0 +1,71 @@
+"""Laws that contain simpler ones: when a rich law was fitted but only its simple part is needed."""
+
+import numpy as np
+
+from wipx.diagnose.fitting import Fit
+from wipx.diagnose.log import Log
+from wipx.diagnose.robust import covariance
+from wipx.identify.noise import quantisation
+
+INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
+BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
+CERTAIN = 2.0  # standard deviations
+ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
+
+
+def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
+    """The effects of a fit with one law replaced by the simpler one that it amounts to; None where it does not."""
+    for effect in fit.effects:
+        kind = _amounts_to(effect, fit, log)
+        if kind is not None:
+            other = f"{effect.partition('/')[0]}/{kind}"
+            rest = tuple(other if e == effect else e for e in fit.effects)
+            if len(set(rest)) == len(rest):
+                return rest
+    return None
+
+
+def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:
+    site, _, kind = effect.partition("/")
+    value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
+    if kind == "presliding":
+        visible = INVISIBLE * _resolution(site, fit, log)
+        return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
+    if kind == "stribeck":
+        return "coulomb" if not _peak_is_certain(effect, fit, log) else None
+    if kind == "speed_limit":
+        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(log) else None
+    if kind == "payload_event":
+        return "payload" if value["t0"] <= float(log.inputs.t[0].max()) + 0.15 else None
+    if kind == "sticky_spot":
+        travel = log.measured[:, 0][log.rows]
+        inside = np.mean((travel >= value["lo"]) & (travel <= value["hi"]))
+        return "coulomb" if inside > ALL_OVER else None
+    return None
+
+
+def _resolution(site: str, fit: Fit, log: Log) -> float:
+    joint = log.plant.joints.index(site)
+    series = [r[log.plant.coordinates[joint]] for r in log.recordings]
+    return max(quantisation(series), float(fit.levels.sensor[joint]))
+
+
+def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
+    """Whether static and Coulomb level differ by more than chance."""
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    static, level = space.names.index(f"{effect}.F_s"), space.names.index(f"{effect}.F_c")
+    size = np.array([p.high - p.low for p in space.free])
+    slope = np.zeros(len(cube))
+    slope[[static, level]] = size[static], -size[level]
+    peak = float(slope @ cube)
+    return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit, log) @ slope))
+
+
+def _top_speed(log: Log) -> float:
+    joint = log.plant.joints.index(log.plant.actuated[0])
+    speeds = []
+    for r in log.recordings:
+        q = r[log.plant.coordinates[joint]]
+        step = max(1, min(round(0.05 * r.rate), len(q) - 1))
+        speeds.append(np.abs((q[step:] - q[:-step]) / (r.t[step:] - r.t[:-step])).max())
+    return float(max(speeds))

@@ -1,0 +1,51 @@
+"""Uncertainty that does not trust the noise model: sandwich estimates over stretches of time.
+
+Huber 1967; White 1982. Innovations that the colour did not make quite white, or whose size changes along
+the run, leave scores that add up within a stretch of time; their sum over stretches shows by how
+much the plain covariance is too small.
+"""
+
+import numpy as np
+
+from wipx.diagnose.fitting import Fit
+from wipx.diagnose.log import Log
+
+STRETCH = 0.5  # [s]; several times the memory of the innovations
+
+
+def stretches(log: Log) -> np.ndarray:
+    """Number of the stretch of time of every row that counts, shape (N,)."""
+    number = np.floor((log.inputs.t - log.inputs.t[0]) / STRETCH).astype(np.int64)
+    labels = number + 1_000_000 * np.arange(log.inputs.windows)
+    return np.unique(labels[log.counted], return_inverse=True)[1]
+
+
+def covariance(fit: Fit, log: Log) -> np.ndarray:
+    """Covariance of the position in the cube, shape (D, D); at least the plain one."""
+    plain = np.linalg.pinv(fit.information)
+    scores = _scores(fit, log)
+    sandwich = plain @ (scores.T @ scores) @ plain
+    larger = np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0)
+    scale = np.sqrt(larger * np.diag(plain))
+    correlation = plain / np.sqrt(np.outer(np.diag(plain), np.diag(plain)) + 1e-300)
+    return correlation * np.outer(scale, scale)
+
+
+def inflation(fit: Fit, log: Log, indices: list[int]) -> float:
+    """By how much evidence for parameters is overstated: variance of their estimates over the plain one, at least 1."""
+    if not indices:
+        return 1.0
+    plain = np.diag(np.linalg.pinv(fit.information))
+    robust = np.diag(covariance(fit, log))
+    return float(max(1.0, np.median(robust[indices] / np.maximum(plain[indices], 1e-300))))
+
+
+def _scores(fit: Fit, log: Log) -> np.ndarray:
+    """Sum of slopes times innovations over each stretch, shape (stretches, D)."""
+    white = fit.white.ravel()
+    products = fit.jacobian[: white.size] * white[:, None]
+    by_row = products.reshape(len(fit.white), -1, products.shape[1]).sum(axis=1)
+    labels = stretches(log)
+    sums = np.zeros((labels.max() + 1, products.shape[1]))
+    np.add.at(sums, labels, by_row)
+    return sums

@@ -1,0 +1,112 @@
+"""Screening: what every effect of the vocabulary would explain, estimated with one simulation each.
+
+A score test (Rao 1948): the change that a small dose of an effect makes in the white innovations,
+freed of what the numbers already in the model can imitate, is compared with the innovations themselves.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from wipx.core.effect import Effect
+from wipx.core.model import ModelBatch
+from wipx.core.parameters import Scales
+from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnose.hypothesis import Setting
+from wipx.effects.catalogue import vocabulary
+
+FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
+CHUNK = 24  # models simulated at once; bounds the memory
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: Its name.
+        gain: What adding it is expected to gain, in nats.
+        values: Where a fit should start, by "site/kind.symbol" [SI].
+    """
+
+    effect: str
+    gain: float
+    values: Mapping[str, float]
+
+
+def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = False) -> list[Prospect]:
+    """Where to start for every effect that could be added to a fit, best first.
+
+    Args:
+        fitter: Fits and simulates.
+        setting: The robot.
+        fit: What is already explained.
+        beyond: Whether to look at the effects that contract section 3 lacks instead of those it has.
+    """
+    known = vocabulary(setting.nominal.plant)
+    present = set(fit.hypothesis.model.effects)
+    found: list[Prospect] = []
+    for name, effect in known.items():
+        if effect.beyond == beyond and not _excluded(name, effect, present, known):
+            found += _looked_at(fitter, setting, fit, name, effect)
+    return sorted(found, key=lambda prospect: -prospect.gain)
+
+
+def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, Effect]) -> bool:
+    site = name.partition("/")[0]
+    others = {f"{site}/{kind}" for kind in effect.excludes}
+    excluding = {p for p in present if f"{p.partition('/')[0]}/{effect.kind}" == name and effect.kind in known[p].excludes}
+    return name in present or bool(others & present) or bool(excluding)
+
+
+def doses(effect: Effect, scales: Scales) -> np.ndarray:
+    """Values of an effect's parameters at which it is looked for, shape (atoms, parameters) [SI]."""
+    axes = [[g * scales.of(p.dimension) for g in (p.grid or (p.start,))] for p in effect.parameters]
+    atoms = np.array(list(product(*axes)))
+    names = [p.name for p in effect.parameters]
+    if {"lo", "hi"} <= set(names):
+        atoms = atoms[atoms[:, names.index("lo")] < atoms[:, names.index("hi")]]
+    return atoms
+
+
+def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Effect) -> list[Prospect]:
+    atoms = doses(effect, setting.scales[name.partition("/")[0]])
+    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+    model = fit.hypothesis.model.with_effects({name: effect.neutral})
+    base = fit.white.ravel()
+    basis = _basis(fit.jacobian[: base.size])
+    left = base - basis @ (basis.T @ base)
+    grown = np.array([p.name in effect.linear_in for p in effect.parameters])
+    neutral = np.array([p.neutral for p in effect.parameters])
+    low, high = _bounds(setting, name, effect)
+    found = []
+    for begin in range(0, len(atoms), CHUNK):
+        part = atoms[begin : begin + CHUNK]
+        change = fitter.white_of(fit, ModelBatch(model, names, part)) - base
+        change -= (change @ basis) @ basis.T
+        slope, size = change @ left, np.sum(change**2, axis=1)
+        for i, atom in enumerate(part):
+            dose = 1.0
+            if grown.any():
+                dose = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
+            values = np.where(grown, neutral + dose * (atom - neutral), atom)
+            if dose == 0.0 or np.any(values < low) or np.any(values > high):
+                continue
+            gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
+            found.append(Prospect(name, float(gain), dict(zip(names, values.tolist(), strict=True))))
+    return found
+
+
+def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np.ndarray]:
+    scales = setting.scales[name.partition("/")[0]]
+    sizes = np.array([scales.of(p.dimension) for p in effect.parameters])
+    return np.array([p.low for p in effect.parameters]) * sizes, np.array([p.high for p in effect.parameters]) * sizes
+
+
+def _basis(jacobian: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of the columns of a matrix (N, D)."""
+    if not jacobian.shape[1]:
+        return np.zeros((len(jacobian), 0))
+    return np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0]

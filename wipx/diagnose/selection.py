@@ -1,0 +1,184 @@
+"""Which effects are missing: forward selection, elimination and exchange by penalised likelihood.
+
+Every step compares hypotheses that are fitted to the end, noise included. The penalty is that of the
+Bayesian information criterion (Schwarz 1978); evidence is divided by how much scores vary
+more than the noise model has it, and a step must also be worth a share of what is explained already, so
+that the small print of a law is not filled up with further effects.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wipx.core.diagnosis import Candidate
+from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnose.hypothesis import Hypothesis, Setting
+from wipx.diagnose.nested import simpler
+from wipx.diagnose.robust import inflation
+from wipx.diagnose.screening import Prospect, prospects
+
+MOST_EFFECTS = 4
+LEAST_GAIN = 8.0  # nats beyond the penalty
+LEAST_SHARE = 0.01  # of what is explained already
+CONSIDERED = 8  # effects that are fitted in each step
+PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
+STARTS = 2  # of each effect
+CLOSE = 0.5  # of the best gain, from which noise levels are searched too
+POLISHED = 4  # effects for which they are, at most
+WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
+EXCHANGES = 3  # rounds at most
+
+
+@dataclass
+class Selection:
+    """The search for the missing effects of one robot.
+
+    Attributes:
+        fitter: Fits hypotheses.
+        setting: The robot.
+        nominal: The fit of the nominal model.
+        considered: What was looked at, in order.
+    """
+
+    fitter: Fitter
+    setting: Setting
+    nominal: Fit
+    considered: list[Candidate] = field(default_factory=list)
+    _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
+    _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
+
+    def run(self) -> Fit:
+        """The fit of the effects that are missing; `nominal` where none is."""
+        current = self.nominal
+        while len(current.effects) < MOST_EFFECTS:
+            extended = self.extensions(current)
+            best = self.preferred(extended)
+            if best is None or not self.worthwhile(current, best):
+                self._remember(current, extended, None)
+                break
+            self._remember(current, extended, best)
+            current = self.pruned(best)
+        return self.exchanged(current)
+
+    def score(self, fit: Fit) -> float:
+        """Penalised log-likelihood."""
+        own = sum(len(fit.hypothesis.parameters_of(effect)) for effect in fit.effects)
+        return fit.log_likelihood - 0.5 * own * np.log(len(fit.white))
+
+    def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether the effects that `larger` has beside those of `smaller` are worth it."""
+        added = [effect for effect in larger.effects if effect not in smaller.effects]
+        indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
+        gain = larger.log_likelihood - smaller.log_likelihood
+        evidence = gain / inflation(larger, self.fitter.follower.log, indices)
+        penalty = 0.5 * len(indices) * np.log(len(larger.white))
+        explained = max(smaller.log_likelihood - self.nominal.log_likelihood, 0.0)
+        return evidence - penalty >= max(LEAST_GAIN, LEAST_SHARE * explained)
+
+    def extensions(self, fit: Fit) -> list[Fit]:
+        """Fits with one effect more, the best first."""
+        key = frozenset(fit.effects)
+        if key not in self._extensions:
+            self._extensions[key] = self._extended(fit)
+        return self._extensions[key]
+
+    def preferred(self, fits: list[Fit]) -> Fit | None:
+        """The best fit, or a simpler one that is as good."""
+        if not fits:
+            return None
+        best = max(fits, key=self.score)
+        replaced = simpler(best, self.fitter.follower.log)
+        while replaced is not None:
+            found = self.fitted(replaced, best)
+            if self.score(found) < self.score(best) - self._tolerance(best):
+                break
+            best = found
+            replaced = simpler(best, self.fitter.follower.log)
+        return best
+
+    def fitted(self, effects: tuple[str, ...], start: Fit) -> Fit:
+        """The fit of some effects, from the values and noise of another fit on."""
+        key = frozenset(effects)
+        if key not in self._fits:
+            hypothesis = Hypothesis.of(self.setting, effects, start.hypothesis.values)
+            self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
+        return self._fits[key]
+
+    def pruned(self, fit: Fit) -> Fit:
+        """Without the effects that the latest one made superfluous."""
+        for effect in fit.effects[:-1]:
+            rest = tuple(e for e in fit.effects if e != effect)
+            smaller = self.fitted(rest, fit)
+            if not self.worthwhile(smaller, fit):
+                self.considered.append(
+                    Candidate(effect, fit.log_likelihood - smaller.log_likelihood, False, "superfluous beside the others")
+                )
+                return self.pruned(smaller) if len(rest) > 1 else smaller
+        return fit
+
+    def exchanged(self, fit: Fit) -> Fit:
+        """Every effect replaced by a better one, as long as there is any."""
+        for _ in range(EXCHANGES):
+            best = fit
+            for effect in fit.effects:
+                found = self.preferred(self.replacements(fit, effect))
+                if found is not None and self.score(found) > self.score(best) + 2.0:
+                    best = found
+            if best is fit:
+                break
+            fit = best
+        return fit
+
+    def replacements(self, fit: Fit, effect: str) -> list[Fit]:
+        """Fits with another effect in the place of one, the best first."""
+        rest = tuple(e for e in fit.effects if e != effect)
+        reduced = self.fitted(rest, fit) if rest else self.nominal
+        return self.extensions(reduced)
+
+    def _tolerance(self, best: Fit) -> float:
+        return max(4.0, LEAST_SHARE * (best.log_likelihood - self.nominal.log_likelihood))
+
+    def _extended(self, fit: Fit) -> list[Fit]:
+        ranked = prospects(self.fitter, self.setting, fit)
+        by_effect: dict[str, list[Prospect]] = {}
+        for prospect in ranked:
+            by_effect.setdefault(prospect.effect, []).append(prospect)
+        if not ranked or ranked[0].gain < WORTHLESS:
+            return []
+        leading = [name for name in by_effect if by_effect[name][0].gain >= max(PROMISING * ranked[0].gain, WORTHLESS)]
+        fits = [self._best_start(fit, by_effect[name][:STARTS]) for name in leading[:CONSIDERED]]
+        fits.sort(key=lambda f: -self.score(f))
+        gains = [f.log_likelihood - fit.log_likelihood for f in fits]
+        polished = [
+            self.fitter.polished(f) if gain >= CLOSE * max(gains) and i < POLISHED else f
+            for i, (f, gain) in enumerate(zip(fits, gains, strict=True))
+        ]
+        for found in polished:
+            self._fits.setdefault(frozenset(found.effects), found)
+        return sorted(polished, key=lambda f: -self.score(f))
+
+    def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
+        effects = (*fit.effects, starts[0].effect)
+        fits = [
+            self.fitter.fit(
+                Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start.values}), fit.levels, steps=5
+            )
+            for start in starts
+        ]
+        return max(fits, key=lambda f: f.log_likelihood)
+
+    def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:
+        for found in extended:
+            added = [effect for effect in found.effects if effect not in current.effects]
+            gain = found.log_likelihood - current.log_likelihood
+            taken = chosen is not None and found.effects == chosen.effects
+            reason = _reason(found, chosen, gain, taken=taken)
+            self.considered.append(Candidate(" + ".join(added), gain, taken, reason))
+
+
+def _reason(found: Fit, chosen: Fit | None, gain: float, *, taken: bool) -> str:
+    if taken:
+        return "explains most"
+    if chosen is None:
+        return "gains too little to be told from chance and from the small print of the laws"
+    return f"explains less than {chosen.effects[-1]}" if gain > 0.0 else "explains nothing"
