@@ -30,9 +30,9 @@ def _moving_mass(name: str, draw: Draw) -> Oddity:
     """A mass that slides on a spring: sloshing of a liquid, or the first bending mode of a body that is not stiff."""
     p, rng = draw.robot.parameters, draw.rng
     bends = name == "flexible_body"
-    frequency = rng.uniform(4.0, 10.0) if bends else rng.uniform(0.7, 2.0)
-    damping = rng.uniform(0.01, 0.05) if bends else rng.uniform(0.02, 0.1)
-    mass = p["body_mass"] * (rng.uniform(0.2, 0.35) if bends else rng.uniform(0.08, 0.2))
+    frequency = log_uniform(rng, 4.0, 10.0) if bends else rng.uniform(0.7, 2.0)
+    damping = rng.uniform(0.005, 0.02) if bends else rng.uniform(0.02, 0.1)
+    mass = p["body_mass"] * (rng.uniform(0.3, 0.5) if bends else rng.uniform(0.12, 0.3))
     rate = 2.0 * pi * frequency
     values = {"aux_mass": mass, "aux_stiffness": mass * rate**2, "aux_damping": 2.0 * damping * mass * rate}
     if "com_height" in p:
@@ -91,7 +91,7 @@ def _wheel_slip(name: str, draw: Draw) -> Oddity:
     p = draw.robot.parameters
     values = {
         "drive_mass": p["wheel_inertia"] / p["wheel_radius"] ** 2,
-        "traction": draw.rng.uniform(0.35, 0.7) * draw.doing.peak,
+        "traction": draw.rng.uniform(0.6, 1.0) * draw.doing.peak,
         "creep": draw.doing.force[0] / draw.doing.speed[0] * log_uniform(draw.rng, 10.0, 40.0),
     }
     return Oddity(name, values)

@@ -49,15 +49,15 @@ class ParameterScore:
         name: "site/kind.symbol".
         true: Value that was hidden [SI].
         value: Value of the diagnosis.
-        low: Lower end of its 95 % interval.
+        low: Lower end of its 95 % interval; None where the diagnosis gives none.
         high: Upper end.
     """
 
     name: str
     true: float
     value: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
 
     @property
     def error(self) -> float:
@@ -67,7 +67,7 @@ class ParameterScore:
     @property
     def covered(self) -> bool:
         """Whether the true value lies in the interval."""
-        return self.low <= self.true <= self.high
+        return self.low is not None and self.high is not None and self.low <= self.true <= self.high
 
 
 @dataclass(frozen=True)
@@ -281,6 +281,6 @@ def _parameters(
         for symbol, true in values.items():
             if symbol in answers:
                 answer = answers[symbol]
-                low, high = (float("nan") if end is None else end for end in answer["ci95"])
+                low, high = answer["ci95"]
                 found.append(ParameterScore(f"{name}.{symbol}", true, answer["value"], low, high))
     return tuple(found)

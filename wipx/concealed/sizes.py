@@ -187,8 +187,9 @@ def _saturation(site: str, draw: Draw) -> Values:
 
 
 def _speed_limit(site: str, draw: Draw) -> Values:
-    stall = draw.between((0.6, 1.1), (1.1, 1.5)) * draw.doing.peak
-    return {"F_stall": stall, "v_free": draw.rng.uniform(1.1, 1.8) * draw.doing.top_speed[draw.joint(site)]}
+    stall = draw.between((0.7, 1.2), (1.1, 1.5)) * draw.doing.peak
+    free = draw.between((1.3, 2.5), (2.0, 3.5)) * draw.doing.top_speed[draw.joint(site)]
+    return {"F_stall": stall, "v_free": free}
 
 
 def _backlash(site: str, draw: Draw) -> Values:

@@ -20,11 +20,14 @@ class Recording:
         name: File name, or a label.
         columns: Arrays of shape (rows,) by column name of contract section 1, `t` among them [SI].
         source: File or origin, for messages.
+        periods: Commands of the controller per row: 1 where `u` is the command that was held, more where it
+            is their mean because the log is slower than the loop.
     """
 
     name: str
     columns: Mapping[str, np.ndarray]
     source: str = ""
+    periods: int = 1
 
     def __post_init__(self) -> None:
         frozen = {}
@@ -40,7 +43,7 @@ class Recording:
         object.__setattr__(self, "columns", MappingProxyType(frozen))
 
     def __reduce__(self):
-        return Recording, (self.name, dict(self.columns), self.source)
+        return Recording, (self.name, dict(self.columns), self.source, self.periods)
 
     def __getitem__(self, column: str) -> np.ndarray:
         return self.columns[column]
@@ -72,7 +75,7 @@ class Recording:
 
     def rows(self, first: int, last: int) -> "Recording":
         """Rows first <= k < last; times are kept."""
-        return Recording(self.name, {n: a[first:last] for n, a in self.columns.items()}, self.source)
+        return Recording(self.name, {n: a[first:last] for n, a in self.columns.items()}, self.source, self.periods)
 
     def between(self, begin: float, end: float) -> "Recording":
         """Rows with begin <= t < end [s]; times are kept."""

@@ -72,7 +72,8 @@ def site_in_words(site: str, plant_kind: str) -> str:
 def effect_in_words(name: str, plant_kind: str) -> str:
     """An effect "site/kind" of a plant, e.g. "Coulomb friction on the rail joint".
 
-    Several effects, joined by " + ", become "... and ...". A kind that has no words of its own keeps its name.
+    Several effects, joined by " + ", become "... and ...". A kind without words of its own and a name that
+    is no "site/kind" are kept.
     """
     return " and ".join(_one_effect(part.strip(), plant_kind) for part in name.split("+"))
 
@@ -84,5 +85,7 @@ def has_words(kind: str) -> bool:
 
 def _one_effect(name: str, plant_kind: str) -> str:
     site, _, kind = name.partition("/")
+    if not kind:
+        return name
     fallback = f"{kind.replace('_', ' ')} of {{place}}"
     return _KINDS.get(kind, fallback).format(place=site_in_words(site, plant_kind))

@@ -36,7 +36,10 @@ class Log:
         names = (*plant.coordinates, *plant.rates)
         channels = [c for c, name in enumerate(names) if all(name in r for r in recordings)]
         inputs = Inputs.of(
-            [r.t for r in recordings], [r.stack(plant.commands) for r in recordings], [0] * len(recordings)
+            [r.t for r in recordings],
+            [r.stack(plant.commands) for r in recordings],
+            [0] * len(recordings),
+            tuple(r.periods for r in recordings),
         )
         measured = np.zeros((len(inputs.t), len(names), len(recordings)))
         for i, recording in enumerate(recordings):

@@ -119,7 +119,7 @@ class EmulatedTestbed:
             columns[column] = np.round(values / self.position_step) * self.position_step if column == "x" else values
         for c, column in enumerate(plant.commands):
             columns[column] = commands[:rows, c, 0, r].reshape(-1, self.log_every).mean(axis=1)
-        return Recording(name, columns, f"emulated testbed, {name}")
+        return Recording(name, columns, f"emulated testbed, {name}", self.log_every)
 
 
 def _with_hidden_physics(nominal: Model, rng: np.random.Generator) -> Model:

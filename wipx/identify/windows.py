@@ -99,6 +99,7 @@ def cut(
         [recordings[p.recording].t[p.rows] for p in pieces],
         [recordings[p.recording].stack(plant.commands)[p.rows] for p in pieces],
         [p.first for p in pieces],
+        tuple(recordings[p.recording].periods for p in pieces),
     )
     shape = (len(inputs.t), len(pieces))
     recorded = np.zeros((shape[0], len(plant.coordinates), shape[1]))

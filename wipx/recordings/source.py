@@ -129,7 +129,8 @@ class RecordingSource:
             chosen = " that recordings.spans and recordings.where keep" if last - first < table.rows else ""
             raise InputError(f"{path}: {last - first} rows{chosen}, expected {FEWEST_ROWS} or more; leave the file out")
         columns = {column: _read(signal, table, first, last) for column, signal in signals.items() if column != "t"}
-        return Recording(name, {"t": t[first:last], **columns}, str(path))
+        kept_t = t[first:last]
+        return Recording(name, {"t": kept_t, **columns}, str(path), _periods(kept_t, robot))
 
     def _span(self, name: str) -> tuple[float, float]:
         for pattern, span in self.spans.items():
@@ -140,6 +141,13 @@ class RecordingSource:
             begin, end = span
             return float("-inf") if begin is None else begin, float("inf") if end is None else end
         return float("-inf"), float("inf")
+
+
+def _periods(t: np.ndarray, robot: RobotDescription) -> int:
+    """Commands of the controller per row; 1 where its rate is not known."""
+    if robot.controller is None:
+        return 1
+    return max(1, round(float(np.median(np.diff(t))) * robot.controller.rate))
 
 
 def _is_span(span: object) -> bool:

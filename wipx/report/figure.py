@@ -16,9 +16,7 @@ WIDTH = 9.0  # inches; at `panels.DPI` twice the 900 pixels it is read at
 def draw_fit(result: IdentificationResult, path: Path) -> None:
     """Draw recorded against predicted signals and the errors, as PNG.
 
-    The recording is the one of median improvement among the held-out ones (among all, where none was
-    held out); of it, the `SHOWN_WINDOWS` windows in a row whose improvement exceeds that of three
-    quarters of such stretches.
+    The recording is that of `panels.representative_stretch`.
 
     Raises:
         InputError: the file cannot be written.

@@ -123,6 +123,11 @@ def held_out_errors(result: ModelComparison) -> FitErrors | None:
     return result.held_out if result.held_out is not None and result.held_out.windows > 0 else None
 
 
+def windows_by_part(result: ModelComparison) -> dict[str, int]:
+    """Number of windows behind the errors of `HELD_OUT` and `FIT`."""
+    return {label: errors.windows for label, errors in _parts(result)}
+
+
 def headline(result: ModelComparison, arrow: str = "->") -> str:
     """The outcome in one sentence with its figures."""
     rows = judged_errors(result)

@@ -20,7 +20,12 @@ MOST_ROWS = 4000
 
 
 def representative_stretch(result: ModelComparison) -> Trace | None:
-    """The stretch of a recording that pictures show; None where nothing was recorded."""
+    """The stretch of a recording that pictures show; None where nothing was recorded.
+
+    The recording is the one of median improvement among the held-out ones (among all, where none was
+    held out); of it, the `SHOWN_WINDOWS` windows in a row whose improvement exceeds that of three
+    quarters of such stretches.
+    """
     held_out = [trace for trace in result.traces if trace.held_out]
     trace = _quantile(held_out or list(result.traces), 0.5)
     if trace is None:
@@ -42,6 +47,7 @@ def _quantile(traces: list[Trace], share: float) -> Trace | None:
 
 
 def draw_signal(axes: Axes, trace: Trace, column: str, unit: str) -> None:
+    """Draw one column of a trace, recorded and predicted, with its errors in the title."""
     recorded = trace.recorded[column]
     finite = recorded[np.isfinite(recorded)]
     scale = scale_for([np.abs(finite).max(initial=0.0)], unit)
@@ -71,6 +77,7 @@ def _change(trace: Trace, column: str, unit: str) -> str:
 
 
 def draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) -> None:
+    """Draw the errors of nominal model, completed model and noise floor as bars."""
     quiet(axes)
     finite = [height if np.isfinite(height) else 0.0 for height in heights]
     bars = axes.bar(("nominal", "completed", "noise\nfloor"), finite, color=(NOMINAL, COMPLETED, FLOOR), width=0.72)
@@ -86,7 +93,7 @@ def draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) -> 
 
 
 def quiet(axes: Axes) -> None:
-    """Few lines, so that the curves stand out."""
+    """Leave few lines, so that the curves stand out."""
     axes.grid(color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -95,10 +102,12 @@ def quiet(axes: Axes) -> None:
 
 
 def with_unit(name: str, unit: str) -> str:
+    """A label such as "x [mm]"."""
     return f"{name} [{unit}]" if unit else name
 
 
 def png(figure: Figure) -> bytes:
+    """The figure as the content of a PNG file."""
     image = io.BytesIO()
     figure.savefig(image, format="png", dpi=DPI, facecolor="white")
     return image.getvalue()

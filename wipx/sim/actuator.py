@@ -12,7 +12,7 @@ from wipx.sim.rows import W
 
 
 @law
-def delayed_command(S, t_rows, u_rows, lanes, pointers, actuated):
+def delayed_command(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
     """The mean command over the step, after the transport delay (scalar: every lane has its own past)."""
     last = t_rows.shape[0] - 2
     for w in range(W):
@@ -35,10 +35,22 @@ def delayed_command(S, t_rows, u_rows, lanes, pointers, actuated):
             i = k
             while i < last and t_rows[i + 1, window] < end:
                 total += (t_rows[i + 1, window] - done) * u_rows[i, j, column]
+                if on[R.ON_RAMP]:
+                    total += ramped(t_rows, ramps, window, i, j, done, t_rows[i + 1, window])
                 done = t_rows[i + 1, window]
                 i += 1
             total += (end - done) * u_rows[i, j, column]
+            if on[R.ON_RAMP]:
+                total += ramped(t_rows, ramps, window, i, j, done, end)
             S[(R.DRIVE + j) * W + w] = total / h * S[R.INPUT_GAIN * W + w]
+
+
+@law
+def ramped(t_rows, ramps, window, i, j, begin, end):
+    """What the change of command j along row i adds to its integral from `begin` to `end`."""
+    middle = 0.5 * (begin + end) - t_rows[i, window]
+    place = middle / (t_rows[i + 1, window] - t_rows[i, window]) - 0.5
+    return (end - begin) * ramps[i, j, window] * clip(place, -0.5, 0.5)
 
 
 @inlined

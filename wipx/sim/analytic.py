@@ -23,6 +23,7 @@ from wipx.sim.rows import W
 
 LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
 NO_FEEDBACK = np.zeros((1, 4, 1))
+HELD = np.zeros((1, 2, 1))
 NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
 
 
@@ -220,6 +221,11 @@ class _Run:
         closed = feedback is not None
         gains, references, noise, settings = feedback or (np.zeros((2, 4)), NO_FEEDBACK, NO_FEEDBACK, np.zeros(2))
         measured, corrections, group = self._observed(observer)
+        ramps = HELD
+        if not per_lane and self.inputs.ramps is not None:
+            ramps = np.zeros((self.rows, 2, self.inputs.windows))
+            ramps[:, [joint_index(site) for site in self.plant.actuated]] = self.inputs.ramps
+            self.coefficients.present[R.ON_RAMP] = True
 
         def work(begin: int, end: int) -> None:
             rollout(
@@ -229,6 +235,7 @@ class _Run:
                 states,
                 self.inputs.t,
                 commands,
+                ramps,
                 self.row_steps,
                 self.substeps,
                 per_lane,

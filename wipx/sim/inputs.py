@@ -17,21 +17,32 @@ class Inputs:
         first: Row from which each window is integrated, shape (R,); rows before it are only
             remembered, for transport delays.
         last: Last row of each window, shape (R,).
+        ramps: By how much the command changes along each row about its mean, shape (K, inputs, R); None
+            where commands are held.
     """
 
     t: np.ndarray
     commands: np.ndarray
     first: np.ndarray
     last: np.ndarray
+    ramps: np.ndarray | None = None
 
     @classmethod
-    def of(cls, times: list[np.ndarray], commands: list[np.ndarray], first: list[int]) -> "Inputs":
+    def of(
+        cls,
+        times: list[np.ndarray],
+        commands: list[np.ndarray],
+        first: list[int],
+        periods: tuple[int, ...] | None = None,
+    ) -> "Inputs":
         """Windows from one array of times (rows,) and commands (rows, inputs) each.
 
         Args:
             times: Times of each window's rows [s].
             commands: Commands of each window's rows; that of the last row is not used.
             first: Row from which each window is integrated.
+            periods: Commands of the controller per row of each window, whose mean the log has; None for
+                one. Their course is then taken for a straight line between the neighbouring rows.
         """
         rows = max(len(t) for t in times)
         windows = len(times)
@@ -42,7 +53,13 @@ class Inputs:
             t[:n, r] = window_t
             u[: n - 1, :, r] = window_u[: n - 1]
             u[n - 1 :, :, r] = window_u[n - 2]
-        return cls(t, u, np.array(first, dtype=np.int64), np.array([len(x) - 1 for x in times], dtype=np.int64))
+        ramps = None
+        if periods is not None and max(periods) > 1:
+            ramps = np.zeros_like(u)
+            for r, (window_t, window_u) in enumerate(zip(times, commands, strict=True)):
+                ramps[: len(window_t) - 1, :, r] = _ramps(window_t, window_u, periods[r])
+        last = np.array([len(x) - 1 for x in times], dtype=np.int64)
+        return cls(t, u, np.array(first, dtype=np.int64), last, ramps)
 
     @classmethod
     def regular(cls, duration: float, rate: float, inputs: int, windows: int = 1) -> "Inputs":
@@ -69,4 +86,17 @@ class Inputs:
     def until(self, last: np.ndarray) -> "Inputs":
         """The same windows cut after row `last` (R,) each."""
         rows = int(last.max()) + 1
-        return Inputs(self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last))
+        ramps = None if self.ramps is None else self.ramps[: rows - 1]
+        return Inputs(self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last), ramps)
+
+
+def _ramps(t: np.ndarray, commands: np.ndarray, periods: int) -> np.ndarray:
+    """Change of the command along each row, shape (rows - 1, inputs).
+
+    A staircase of n equal steps over a row has the first moment of a ramp 1 - 1/n^2 as high.
+    """
+    interval = np.diff(t)
+    held = commands[:-1]
+    middle = t[:-1] + 0.5 * interval
+    slopes = np.gradient(held, middle, axis=0) if len(held) > 1 else np.zeros_like(held)
+    return (1.0 - 1.0 / periods**2) * slopes * interval[:, None]

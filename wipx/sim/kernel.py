@@ -23,7 +23,7 @@ from wipx.sim.sensors import correct, feedback, record
 
 
 @law
-def step(S, on, t_rows, u_rows, lanes, pointers, actuated):
+def step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
     """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit."""
     for j in range(2):
         for w in range(W):
@@ -31,11 +31,16 @@ def step(S, on, t_rows, u_rows, lanes, pointers, actuated):
             S[(R.MID + j) * W + w] = S[(R.Q + j) * W + w] + half * S[(R.V + j) * W + w]
             S[(R.RATE + j) * W + w] = S[(R.V + j) * W + w] + half * S[(R.ACCELERATION + j) * W + w]
     if on[R.ON_DELAY]:
-        delayed_command(S, t_rows, u_rows, lanes, pointers, actuated)
+        delayed_command(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
     else:
         for w in range(W):
             S[R.DRIVE * W + w] = S[R.COMMAND * W + w]
             S[R.DRIVE1 * W + w] = S[R.COMMAND1 * W + w]
+        if on[R.ON_RAMP]:
+            for w in range(W):
+                S[R.DRIVE * W + w] += S[R.RAMP * W + w] * S[R.PHASE * W + w]
+                S[R.DRIVE1 * W + w] += S[R.RAMP1 * W + w] * S[R.PHASE * W + w]
+                S[R.PHASE * W + w] += S[R.PER_ROW * W + w]
     if actuated[0]:
         actuator_path(S, on, 0)
     if actuated[1]:
@@ -90,17 +95,27 @@ def begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k):
     for w in range(W):
         S[R.COMMAND * W + w] *= S[R.INPUT_GAIN * W + w]
         S[R.COMMAND1 * W + w] *= S[R.INPUT_GAIN * W + w]
+    if on[R.ON_RAMP]:
+        for w in range(W):
+            S[R.RAMP * W + w] *= S[R.INPUT_GAIN * W + w]
+            S[R.RAMP1 * W + w] *= S[R.INPUT_GAIN * W + w]
+            S[R.PER_ROW * W + w] = 1.0 / max(counts[w], 1)
+            S[R.PHASE * W + w] = 0.5 * S[R.PER_ROW * W + w] - 0.5
     return least, most
 
 
 @law
-def replay(S, u_rows, lanes, actuated, k):
+def replay(S, on, u_rows, ramps, lanes, actuated, k):
     """Load the recorded commands of row k."""
     for j in range(2):
         if actuated[j]:
             commands = u_rows[k, j]
             for w in range(W):
                 S[(R.COMMAND + j) * W + w] = commands[lanes[1, w]]
+            if on[R.ON_RAMP]:
+                changes = ramps[k, j]
+                for w in range(W):
+                    S[(R.RAMP + j) * W + w] = changes[lanes[0, w]]
 
 
 @law
@@ -131,6 +146,7 @@ def rollout(
     states,
     t_rows,
     u_rows,
+    ramps,
     row_steps,
     substeps,
     per_lane,
@@ -159,6 +175,7 @@ def rollout(
         states: Start of each lane, shape (STATES, lanes); overwritten with the end.
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, 2, lanes) if `per_lane` (written in closed loop), else (K, 2, R).
+        ramps: Change of each command along a row, shape (K, 2, R); else (1, 2, 1).
         row_steps: Length of the steps from each row to the next, shape (K, R) [s].
         substeps: Their number, shape (K, R); 0 holds the state.
         per_lane: Whether every lane has commands of its own.
@@ -202,12 +219,12 @@ def rollout(
             if closed:
                 feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:
-                replay(S, u_rows, lanes, actuated, k)
+                replay(S, on, u_rows, ramps, lanes, actuated, k)
             least, most = begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k)
             for s in range(most):
                 if s == 0 or s >= least:
                     set_step(S, on, counts, s)
-                step(S, on, t_rows, u_rows, lanes, pointers, actuated)
+                step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
         record(S, on, past, t_rows, lanes, last_row, out, lane0, count)
         for w in range(count):
             for i in range(R.STATES):

@@ -33,7 +33,7 @@ RESULT, SEED = "result.json", "seed.json"
 class Concealed:
     """Draw cases, diagnose each, and count what was found.
 
-    A run that was interrupted continues in the same folder: cases with a result are not done again.
+    A run that was interrupted continues in the same folder: cases with an answer are not done again.
 
     Attributes:
         cases: How many.
@@ -75,9 +75,7 @@ class Concealed:
         path = out / SEED
         begun = int(read_json(path)["seed"]) if path.is_file() else None
         if begun is not None and self.seed not in (None, begun):
-            raise InputError(
-                f"{path}: cases of seed {begun} are here, not of {self.seed}; choose another hydra.run.dir"
-            )
+            raise InputError(f"{path}: the cases here are of seed {begun}, not {self.seed}; set another hydra.run.dir")
         seed = begun if begun is not None else secrets.randbits(32) if self.seed is None else self.seed
         write_json(path, {"seed": seed})
         return seed
@@ -111,10 +109,12 @@ def _bar(cases: int) -> tqdm:
 
 
 def draw_and_diagnose(folder: Path, seed: int, number: int, tiers: tuple[str, ...], time_limit: float) -> CaseScore:
-    """The score of one case; drawn and diagnosed unless its result is there."""
+    """The score of one case; drawn and diagnosed unless its answer is there."""
     place = write_numbered(folder, seed, number, tiers)
     if (place / RESULT).is_file():
-        return _read_score(place / RESULT)
+        scored = _read_score(place / RESULT)
+        if not scored.failure:
+            return scored
     scored = diagnose_case(place, time_limit)
     write_json(place / RESULT, asdict(scored))
     return scored
@@ -158,9 +158,8 @@ def _read_score(path: Path) -> CaseScore:
     data = read_json(path)
     for name in ("truth", "answer"):
         data[name] = tuple(data[name])
-    ends = ("low", "high")
-    found = [{k: float("nan") if v is None and k in ends else v for k, v in p.items()} for p in data["parameters"]]
-    return CaseScore(**{**data, "parameters": tuple(ParameterScore(**one) for one in found)})
+    data["parameters"] = tuple(ParameterScore(**one) for one in data["parameters"])
+    return CaseScore(**data)
 
 
 def _summary(seed: int, scores: list[CaseScore]) -> dict[str, object]:

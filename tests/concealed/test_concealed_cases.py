@@ -1,0 +1,134 @@
+"""Drawn cases: reproducible, complete in the vocabulary, readable by the package."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wipx.concealed.cases import Choice, difference_over_noise, draw_case, noise_of, realise
+from wipx.concealed.logging import record
+from wipx.concealed.oddities import draw_oddity, oddity_names
+from wipx.concealed.physics import Hidden, physics
+from wipx.concealed.robots import draw_robot, linearised
+from wipx.concealed.scenario import draw_log_settings, draw_scenario
+from wipx.concealed.sizes import Draw, consequences, draw_details, draw_values, effect_names
+from wipx.concealed.write import TRUTH, write_cases
+from wipx.core.errors import InputError
+from wipx.core.plant import PLANTS
+from wipx.recordings.source import RecordingSource
+
+SECONDS = 6.5  # beyond the latest payload event
+
+
+def short(scenario):
+    """The first seconds of a scenario."""
+    rows = scenario.rows[scenario.instants[scenario.rows] < SECONDS]
+    end = int(scenario.rows[len(rows)])
+    parts = {name: getattr(scenario, name)[:end] for name in ("reference", "extra", "noise", "rate_noise")}
+    noise = scenario.force_noise[: len(rows)]
+    return replace(scenario, rows=rows, end=end, instants=scenario.instants[: end + 1], force_noise=noise, **parts)
+
+
+@pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis", "double_pendulum"])
+def test_every_effect_and_every_oddity_changes_the_recordings(kind: str):
+    rng = np.random.default_rng(8)
+    robot, settings = draw_robot(kind, rng), draw_log_settings(kind, rng, poor=False)
+    scenario = short(draw_scenario(robot, settings, "multisine", rng))
+    plain = record(robot, physics(kind, robot.parameters, Hidden()), scenario, settings)
+    draw = Draw(robot, consequences(robot, (plain,)), rng, weak=False)
+    changed = {}
+    for name in effect_names(kind):
+        values = draw_values(name, draw)
+        hidden = Hidden({name: values}, {name: draw_details(name, values, draw)})
+        changed[name] = record(robot, physics(kind, robot.parameters, hidden), scenario, settings)
+    for name in oddity_names(kind):
+        hidden = Hidden(oddity=draw_oddity(name, draw))
+        changed[name] = record(robot, physics(kind, robot.parameters, hidden), scenario, settings)
+    noise = noise_of(kind, settings)
+    unchanged = [
+        name
+        for name, run in changed.items()
+        if not run.fell and max(difference_over_noise(kind, (run,), (plain,), noise).values()) < 0.05
+    ]
+    assert unchanged == []
+    assert sum(run.fell for run in changed.values()) <= 0.2 * len(changed)
+
+
+def test_the_vocabulary_is_that_of_the_contract():
+    sites = {name.partition("/")[0] for name in effect_names("wip")}
+    assert sites == set(PLANTS["wip"].sites)
+    assert len(effect_names("wip")) == 5 + 6 + 8 + 4 + 2 + 2 + 3
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_the_controller_stabilises_the_robot(kind: str):
+    rng = np.random.default_rng(2)
+    robot = draw_robot(kind, rng)
+    a, b = linearised(kind, robot.parameters)
+    gains = np.atleast_2d(robot.written_gains)
+    assert np.linalg.eigvals(a - b @ gains).real.max() < -0.3
+
+
+def test_a_seed_gives_the_same_case_and_another_seed_another_one(fresh_seed: int):
+    tiers = ("nothing", "poor_logging")
+    once, again = (draw_case(np.random.default_rng(fresh_seed), tiers) for _ in range(2))
+    other = draw_case(np.random.default_rng(fresh_seed + 1), tiers)
+    for first, second in zip((*once.visible, *once.unseen), (*again.visible, *again.unseen), strict=True):
+        for name in first.columns:
+            assert np.array_equal(first.columns[name], second.columns[name])
+    assert once.hidden == again.hidden
+    assert other.robot.parameters != once.robot.parameters
+
+
+def test_where_nothing_is_missing_the_robot_is_the_nominal_one():
+    case = None
+    for seed in range(10):
+        case = case or realise(Choice("nothing", "wip", ()), np.random.default_rng(seed))
+    assert case is not None
+    assert case.hidden == Hidden()
+    assert case.parameters == case.robot.parameters
+    assert not case.uncertainty
+
+
+def test_a_wrong_parameter_is_listed_as_uncertain():
+    case = None
+    for seed in range(10):
+        choice = Choice("wrong_parameters", "pendulum", ("pitch/coulomb",))
+        case = case or realise(choice, np.random.default_rng(seed))
+    assert case is not None
+    wrong = {name for name, value in case.parameters.items() if value != case.robot.parameters[name]}
+    assert wrong == set(case.uncertainty)
+    assert wrong
+
+
+def test_written_cases_are_read_and_the_diagnosis_sees_no_truth(tmp_path: Path, fresh_seed: int):
+    folders = write_cases(
+        tmp_path, seed=fresh_seed, cases=2, tiers=("single_clear", "poor_logging", "wrong_parameters")
+    )
+    for folder in folders:
+        assert (folder / TRUTH).is_file()
+        assert {path.suffix for path in (folder / "visible").iterdir()} == {".csv", ".yaml"}
+        for part, fewest in (("visible", 4), ("unseen", 3)):
+            source = RecordingSource(path=str(folder / part))
+            assert len(source.load()) >= fewest
+            assert all(recording.duration > 7.0 for recording in source.load())
+            source.describe()
+
+
+def test_the_logged_command_is_the_mean_until_the_next_row():
+    rng = np.random.default_rng(4)
+    robot = draw_robot("linear_axis", rng)
+    settings = replace(draw_log_settings("linear_axis", rng, poor=True), dropped=0.1, every=3)
+    scenario = draw_scenario(robot, settings, "chirp", rng)
+    run = record(robot, physics("linear_axis", robot.parameters, Hidden()), scenario, settings)
+    mass = robot.parameters["body_mass"] + robot.parameters["wheel_mass"]
+    gained = mass * np.diff(run.rates["x"])
+    # momentum: what the mean command gives over each row, gaps and uneven steps included; numbers are rounded
+    given = run.columns["u"][:-1] * np.diff(scenario.instants[scenario.rows])
+    np.testing.assert_allclose(given, gained, atol=1e-3 * np.abs(gained).max())
+
+
+def test_an_unknown_tier_is_refused(tmp_path: Path):
+    with pytest.raises(InputError, match="single_clear"):
+        write_cases(tmp_path, seed=1, cases=1, tiers=("single",))

@@ -1,0 +1,155 @@
+"""A diagnosis in sentences and short texts, which page, terminal and `diagnosis.json` share."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from wipx.core.diagnosis import Diagnosis, FoundEffect, NextExperiment, Period, Region
+from wipx.core.results import Estimate
+from wipx.core.words import effect_in_words, site_in_words
+from wipx.report.numbers import MISSING, compact, significant, with_interval
+from wipx.report.outcome import held_out_errors
+
+VERDICTS = MappingProxyType(
+    {
+        "consistent": "Consistent: nothing is missing",
+        "mismatch": "Mismatch: physics is missing",
+        "unexplained": "Unexplained: known effects are not enough",
+    }
+)
+PLANTS = MappingProxyType(
+    {
+        "wip": "wheeled inverted pendulum",
+        "cartpole": "cart-pole",
+        "pendulum": "pendulum",
+        "linear_axis": "linear axis",
+        "double_pendulum": "double pendulum",
+    }
+)
+SURE = 0.999  # probabilities beyond are not told apart
+
+
+def capitalised(text: str) -> str:
+    """A text with its first letter in upper case, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def percent(share: float) -> str:
+    """A share in per cent, e.g. "81 %"; a dash where there is none."""
+    if not math.isfinite(share):
+        return MISSING
+    text = f"{100.0 * share:.0f}" if abs(share) >= 0.0995 or share == 0.0 else f"{100.0 * share:.1f}"
+    return f"{text} %"
+
+
+def probability(value: float) -> str:
+    """A probability in per cent that never claims certainty; a dash where there is none."""
+    if not math.isfinite(value):
+        return MISSING
+    if value > SURE:
+        return f"> {100.0 * SURE:.1f} %"
+    return f"{100.0 * value:.1f} %" if value >= 1.0 - SURE else f"< {100.0 * (1.0 - SURE):.1f} %"
+
+
+def p_value(value: float) -> str:
+    """A p value, e.g. "p = 0.31"; empty where there is none."""
+    if not math.isfinite(value):
+        return ""
+    return f"p = {significant(value, 2)}" if value >= 1e-4 else "p < 0.0001"
+
+
+def symbol_of(name: str) -> str:
+    """The symbol in the name "site/kind.symbol" of a number."""
+    return name.rpartition(".")[2]
+
+
+def value_in_words(estimate: Estimate) -> str:
+    """A number, its unit and its 95 % interval, e.g. "F_c = 3.10 N [2.93, 3.29]"."""
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{symbol_of(estimate.name)} = {shown_value(estimate)}{unit} {shown_interval(estimate)}"
+
+
+def shown_value(estimate: Estimate) -> str:
+    """The value with the digits that its interval leaves meaningful."""
+    return with_interval(estimate.value, estimate.low, estimate.high).value
+
+
+def shown_interval(estimate: Estimate) -> str:
+    """The 95 % interval in brackets; words where an end is unknown."""
+    if not (math.isfinite(estimate.low) and math.isfinite(estimate.high)):
+        return "(not determined)"
+    return with_interval(estimate.value, estimate.low, estimate.high).ends
+
+
+def values_in_words(parameters: Mapping[str, float]) -> str:
+    """Values by symbol, e.g. "F_c = 3.1, v_s = 0.05"; SI units."""
+    return ", ".join(f"{symbol} = {compact(value)}" for symbol, value in parameters.items())
+
+
+def tie_sentence(effect: FoundEffect, plant_kind: str) -> str:
+    """What these recordings cannot tell an effect from; empty where there is nothing."""
+    if not effect.equivalent:
+        return ""
+    others = " or ".join(effect_in_words(name, plant_kind) for name in effect.equivalent)
+    return f"These recordings cannot tell {effect_in_words(effect.name, plant_kind)} from {others}."
+
+
+def region_sentence(region: Region, units: Mapping[str, str]) -> str:
+    """Where in the state space much of the mismatch is."""
+    unit = units.get(region.signal, "")
+    interval = _interval(region.low, region.high, unit)
+    return f"{percent(region.share)} of the excess error lies where {region.signal} is {interval}."
+
+
+def period_sentence(period: Period) -> str:
+    """When much of the mismatch of a recording is."""
+    return (
+        f"{percent(period.share)} of the excess error of {period.recording} lies at times "
+        f"{_interval(period.low, period.high, 's')}."
+    )
+
+
+def unexplained_sentence(diagnosis: Diagnosis) -> str:
+    """What the named effects leave over, in one or two sentences."""
+    left = diagnosis.unexplained
+    chance = p_value(left.p_value)
+    aside = f" ({chance})" if chance else ""
+    if not left.significant:
+        return f"Nothing significant is left over{aside}: what remains looks like sensor noise."
+    kind = diagnosis.model.plant.kind
+    place = f" at {site_in_words(left.site, kind)}" if left.site else ""
+    shape = f": {left.shape}" if left.shape else ""
+    sentence = f"A significant part is left over{place}{aside} that no effect of the vocabulary explains{shape}."
+    if left.resembles:
+        sentence += f" It resembles {' or '.join(effect_in_words(name, kind) for name in left.resembles)}."
+    return sentence
+
+
+def held_out_words(diagnosis: Diagnosis) -> str:
+    """What the errors were judged on."""
+    return "held-out recordings" if held_out_errors(diagnosis) else "the fitted recordings (none were held out)"
+
+
+def next_step(following: NextExperiment | None) -> str | None:
+    """What to record next and why, as text; None where nothing is open."""
+    if following is None:
+        return None
+    return f"{_ended(following.question)} {_ended(following.best.how)}"
+
+
+def separation(value: float) -> str:
+    """A separation in standard deviations, e.g. "12 standard deviations"; a dash where there is none."""
+    return f"{significant(value, 2)} standard deviations" if math.isfinite(value) else MISSING
+
+
+def _interval(low: float, high: float, unit: str) -> str:
+    after = f" {unit}" if unit else ""
+    if not math.isfinite(low):
+        return f"below {compact(high, 3)}{after}"
+    if not math.isfinite(high):
+        return f"above {compact(low, 3)}{after}"
+    return f"between {compact(low, 3)} and {compact(high, 3)}{after}"
+
+
+def _ended(sentence: str) -> str:
+    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
