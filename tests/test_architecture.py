@@ -11,7 +11,7 @@ LAYERS = (
     {"core"},
     {"effects"},
     {"sim"},
-    {"control", "identify", "learn", "hardware", "recordings", "report", "tracking"},
+    {"concealed", "control", "identify", "learn", "hardware", "recordings", "report", "tracking"},
     {"diagnose"},
     {"tasks"},
     {"config"},

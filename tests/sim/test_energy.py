@@ -21,7 +21,7 @@ FRICTION = {
     "load_friction": {"K_motor": 0.2, "K_external": 0.1},
     "lagged_stribeck": {"F_s": 0.4, "F_c": 0.2, "v_s": 0.1, "sigma": 0.1, "epsilon": 1e-3, "alpha": 1.0},
 }
-STORING = ("rotor_inertia",)  # acts at a joint and is no friction
+STORING = ("rotor_inertia", "resonance", "remainder")  # act at a joint and are no friction
 AT_JOINTS = [
     (kind, name)
     for kind in PLANTS

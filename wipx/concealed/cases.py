@@ -32,7 +32,11 @@ TIERS = {  # how often each is drawn
 }
 PLANT_SHARES = {"wip": 0.6, "cartpole": 0.12, "pendulum": 0.12, "linear_axis": 0.08, "double_pendulum": 0.08}
 KNOWN_SHARE = 0.15  # of robots whose owner knows the viscous friction of a joint
-SHOWS = {"clear": 3.0, "weak": 0.7, "outside": 4.0}  # least difference of some signal without the effect, over the noise
+SHOWS = {
+    "clear": 3.0,
+    "weak": 0.7,
+    "outside": 4.0,
+}  # least difference of some signal, over the noise
 ATTEMPTS = 40  # robots for one choice of effects, before another choice
 UNCERTAIN = {
     "wip": ("body_inertia", "com_height", "body_mass", "wheel_mass"),

@@ -46,8 +46,8 @@ def _cubic(name: str, draw: Draw) -> Oddity:
     """Force a v - b v^3: it feeds energy in below the speed sqrt(a/b), and takes it above."""
     joint = DRIVEN[draw.robot.kind][0]
     speed = draw.doing.speed[joint]
-    feed = draw.rng.uniform(0.15, 0.4) * draw.doing.force[joint] / speed
-    values = {"regeneration": feed, "regeneration_cubic": feed / (draw.rng.uniform(0.8, 1.6) * speed) ** 2}
+    feed = draw.rng.uniform(0.06, 0.2) * draw.doing.force[joint] / speed
+    values = {"regeneration": feed, "regeneration_cubic": feed / (draw.rng.uniform(0.5, 1.2) * speed) ** 2}
     return Oddity(name, values, joint)
 
 

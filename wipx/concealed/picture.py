@@ -42,7 +42,7 @@ def draw_confusions(counts: Mapping[tuple[str, str], int], path: Path) -> None:
     axes.set_axisbelow(True)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
-    axes.set_title("What was hidden and what was answered, cases with at most one effect", loc="left", fontsize=10)
+    axes.set_title("Cases with at most one effect", loc="left", fontsize=10)
     figure.savefig(path, format="png", dpi=DPI, facecolor="white")
 
 

@@ -33,6 +33,14 @@ def clip(value, low, high):
 
 
 @law
+def above(excess, spread):
+    """Mean of what is above zero of numbers spread evenly by +-`spread` about `excess`."""
+    width = maximum(spread, 1e-12)
+    inside = clip(excess, -width, width) + width
+    return inside * inside / (4.0 * width) + maximum(excess - width, 0.0)
+
+
+@law
 def sign(value):
     """-1, 0 or 1."""
     return (1.0 if value > 0.0 else 0.0) - (1.0 if value < 0.0 else 0.0)

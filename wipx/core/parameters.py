@@ -5,6 +5,7 @@ from dataclasses import dataclass
 UNITS = {
     # dimension: (unit at a sliding joint, unit at a turning joint)
     "force": ("N", "N m"),
+    "limit": ("N", "N m"),  # of an actuator; measured by the largest command
     "velocity": ("m/s", "rad/s"),
     "coordinate": ("m", "rad"),
     "damping": ("N s/m", "N m s/rad"),
@@ -31,6 +32,7 @@ class Scales:
         mass: Mass of the body [kg].
         length: Size of the body [m].
         duration: Length of a recording [s].
+        command: Largest force that was commanded [N or N m].
     """
 
     force: float = 1.0
@@ -39,11 +41,13 @@ class Scales:
     mass: float = 1.0
     length: float = 1.0
     duration: float = 10.0
+    command: float = 1.0
 
     def of(self, dimension: str) -> float:
         """The characteristic size of a `dimension` of `UNITS`, in its SI unit."""
         return {
             "force": self.force,
+            "limit": self.command,
             "velocity": self.velocity,
             "coordinate": self.coordinate,
             "damping": self.force / self.velocity,

@@ -51,6 +51,8 @@ _KINDS = MappingProxyType(
         "presliding": "pre-sliding (bristle) friction on {place}",
         "quadratic_drag": "quadratic drag on {place}",
         "rail_tilt": "tilt of the rail",
+        "remainder": "force of unknown origin on {place}",
+        "resonance": "resonance (something swings along) on {place}",
         "ripple": "torque ripple (cogging) of the motor",
         "rotor_inertia": "reflected rotor inertia on {place}",
         "saturation": "saturation of {place}",

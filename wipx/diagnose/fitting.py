@@ -34,8 +34,9 @@ class Fit:
         hypothesis: With its best values.
         levels: Noise levels.
         colour: Of its innovations.
-        white: White innovations, shape (N, m).
-        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N m + priors, D).
+        white: White innovations, shape (R, m, K + 1); zero at rows that do not count.
+        rows: Number of rows that count.
+        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (R m (K + 1) + priors, D).
         log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
     """
 
@@ -43,6 +44,7 @@ class Fit:
     levels: NoiseLevels
     colour: Colour
     white: np.ndarray
+    rows: int
     jacobian: np.ndarray
     log_likelihood: float
 
@@ -121,7 +123,7 @@ class Fitter:
         return _levels(best, joints)
 
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
-        """White innovations of other models, with observer and colour of a fit, shape (P, N m)."""
+        """White innovations of other models, with observer and colour of a fit, shape (P, R m (K + 1))."""
         gains = self.follower.gains(fit.levels, fit.hypothesis.model)
         innovations = self.follower.innovations(batch, (gains,), np.zeros(batch.size, dtype=np.int64))
         return whitened(innovations, fit.colour, self.follower.log).reshape(batch.size, -1)
@@ -138,7 +140,7 @@ class Fitter:
         priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
         likelihood = scale + colour.log_likelihood - 0.5 * float(priors @ priors)
         slopes = np.zeros((white.size + len(priors), len(hypothesis.cube)))
-        return Fit(hypothesis, levels, colour, white, slopes, likelihood)
+        return Fit(hypothesis, levels, colour, white, int(log.counted.sum()), slopes, likelihood)
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
         gains = self.follower.gains(levels, hypothesis.model)

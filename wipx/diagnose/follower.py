@@ -10,6 +10,7 @@ from wipx.diagnose.log import Log
 from wipx.diagnose.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
 from wipx.identify.prediction import true_state
 from wipx.sim.analytic import AnalyticSimulator, Observer
+from wipx.sim.cache import cached
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
 DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
@@ -49,7 +50,7 @@ class Follower:
         return self._known[key]
 
     def innovations(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray) -> np.ndarray:
-        """Innovations in standard deviations of the observer, shape (P, K + 1, R, m).
+        """Innovations in standard deviations of the observer, shape (P, R, m, K + 1).
 
         Args:
             batch: P models.
@@ -58,17 +59,10 @@ class Follower:
         """
         log = self.log
         start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
-        observer = Observer(log.measured, np.stack([g.gains for g in gains]), group)
-        shown = self.simulator.follow(batch, log.inputs, start, observer)
-        predicted = np.concatenate([shown.coordinates, shown.rates], axis=1)[:, log.channels]
-        errors = np.moveaxis(log.measured[:, log.channels, None, :] - predicted, (2, 0, 3, 1), (0, 1, 2, 3))
-        out = np.empty_like(errors, order="C")
-        for g, one in enumerate(gains):
-            chosen = group == g
-            out[chosen] = np.einsum("krcd,pkrd->pkrc", one.whitening, errors[chosen])
-        np.fmin(out, LARGEST, out=out)  # also where it is not a number
-        np.fmax(out, -LARGEST, out=out)
-        return out
+        corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
+        whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
+        shown = self.simulator.follow(batch, log.inputs, start, Observer(log.measured, corrections, group))
+        return _innovations(log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last)
 
     @cached_property
     def _first_rows(self) -> np.ndarray:
@@ -83,3 +77,25 @@ class Follower:
                 first[[j, log.joints + j], r] = fit[0], fit[1]
         return first
 
+
+@cached
+def _innovations(measured, coordinates, rates, channels, whitening, group, last):
+    rows, joints, models, recordings = coordinates.shape
+    m = len(channels)
+    out = np.zeros((models, recordings, m, rows))
+    error = np.zeros(m)
+    for p in range(models):
+        g = group[p]
+        for r in range(recordings):
+            for k in range(last[r] + 1):
+                for c in range(m):
+                    i = channels[c]
+                    shown = coordinates[k, i, p, r] if i < joints else rates[k, i - joints, p, r]
+                    error[c] = measured[k, i, r] - shown
+                for c in range(m):
+                    total = 0.0
+                    for d in range(c + 1):
+                        total += whitening[g, k, r, c, d] * error[d]
+                    # Also where it is not a number: a model that fell over is only counted so far.
+                    out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
+    return out

@@ -133,6 +133,20 @@ def observer_gains(
 
 
 @cached
+def transition_over(a, dt, transition):
+    """exp(A dt) to third order, written to `transition`; A has the slopes `a` of the accelerations."""
+    joints, n = a.shape
+    for j in range(joints):
+        for l in range(n):
+            second = a[j, l - joints] if l >= joints else 0.0
+            for i in range(joints):
+                second += a[j, joints + i] * a[i, l]
+            transition[j, l] = (1.0 if j == l else 0.0) + (dt if l == joints + j else 0.0)
+            transition[j, l] += 0.5 * dt * dt * a[j, l] + dt**3 / 6.0 * second
+            transition[joints + j, l] = (1.0 if l == joints + j else 0.0) + dt * a[j, l] + 0.5 * dt * dt * second
+
+
+@cached
 def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
     rows, recordings = place.shape
     joints = b.shape[1]
@@ -208,19 +222,7 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
                     covariance[i, l] = 0.5 * (half[i, l] + half[l, i])
             dt = intervals[k, r]
             g = place[k, r]
-            # exp(A dt) to third order.
-            for j in range(joints):
-                for l in range(n):
-                    transition[j, l] = (1.0 if j == l else 0.0) + (dt if l == joints + j else 0.0)
-                    transition[j, l] += 0.5 * dt * dt * a[g, j, l]
-                    transition[joints + j, l] = (1.0 if l == joints + j else 0.0) + dt * a[g, j, l]
-                    second = 0.0
-                    for i in range(joints):
-                        second += a[g, j, joints + i] * a[g, i, l]
-                    if l >= joints:
-                        second += a[g, j, l - joints]
-                    transition[joints + j, l] += 0.5 * dt * dt * second
-                    transition[j, l] += dt**3 / 6.0 * second
+            transition_over(a[g], dt, transition)
             for i in range(n):
                 for l in range(n):
                     total = 0.0
@@ -238,11 +240,7 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
                         drive = 0.0
                         for q in range(joints):
                             drive += b[g, i % joints, q] * b[g, l % joints, q] * force[q]
-                        span = (
-                            dt
-                            if i >= joints and l >= joints
-                            else (0.5 * dt * dt if l >= joints else dt**3 / 3.0)
-                        )
+                        span = dt if i >= joints and l >= joints else (0.5 * dt * dt if l >= joints else dt**3 / 3.0)
                         total += louder * drive * span
                     covariance[i, l] = total
                     covariance[l, i] = total

@@ -14,10 +14,10 @@ STRETCH = 0.5  # [s]; several times the memory of the innovations
 
 
 def stretches(log: Log) -> np.ndarray:
-    """Number of the stretch of time of every row that counts, shape (N,)."""
+    """Number of the stretch of time of every row, shape (R, K + 1); rows that do not count share that of others."""
     number = np.floor((log.inputs.t - log.inputs.t[0]) / STRETCH).astype(np.int64)
-    labels = number + 1_000_000 * np.arange(log.inputs.windows)
-    return np.unique(labels[log.counted], return_inverse=True)[1]
+    labels = np.where(log.rows, number, 0) + 1_000_000 * np.arange(log.inputs.windows)
+    return np.unique(labels.T, return_inverse=True)[1].reshape(labels.T.shape)
 
 
 def covariance(fit: Fit, log: Log) -> np.ndarray:
@@ -43,9 +43,10 @@ def inflation(fit: Fit, log: Log, indices: list[int]) -> float:
 def _scores(fit: Fit, log: Log) -> np.ndarray:
     """Sum of slopes times innovations over each stretch, shape (stretches, D)."""
     white = fit.white.ravel()
-    products = fit.jacobian[: white.size] * white[:, None]
-    by_row = products.reshape(len(fit.white), -1, products.shape[1]).sum(axis=1)
-    labels = stretches(log)
-    sums = np.zeros((labels.max() + 1, products.shape[1]))
-    np.add.at(sums, labels, by_row)
-    return sums
+    labels = np.repeat(stretches(log)[:, None], fit.white.shape[1], axis=1).ravel()
+    return sums_over(labels, fit.jacobian[: white.size] * white[:, None])
+
+
+def sums_over(labels: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Sums of the rows of (N, D) that share a label (N,), shape (labels, D)."""
+    return np.stack([np.bincount(labels, weights=column) for column in values.T], axis=1)

@@ -6,7 +6,7 @@ being given a diagnosis. What is uncertain by a few per cent is no slip; that is
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,12 +19,15 @@ from wipx.diagnose.follower import Follower
 from wipx.diagnose.hypothesis import Hypothesis, Setting
 from wipx.diagnose.log import Log
 from wipx.diagnose.observer import NoiseLevels
+from wipx.diagnose.selection import Selection
+from wipx.identify.parameter_space import scales_of
+from wipx.sim.analytic import AnalyticSimulator
 
 PROBE_SPAN = 3.0  # [s] of a recording; a gross error shows in every second of it
 PROBE_RECORDINGS = 4
 ROUNDS = 3  # of noise levels and values in turn
-OVERWHELMING = 0.15  # nats for every row and channel: innovations 16 % larger throughout
-CLEARLY = 1.5  # times what the best effect gains
+OVERWHELMING = 0.04  # nats for every row and channel: innovations 4 % larger throughout
+QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins [s^0.5]
 GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
 ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
 
@@ -65,6 +68,8 @@ class Slip:
 def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
     """Refuse a robot.yaml that the recordings contradict grossly.
 
+    The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside.
+
     Args:
         fitter: Of the recordings.
         setting: The robot.
@@ -76,20 +81,17 @@ def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, w
         InputError: a sign, a unit or a zero is wrong; the message says which and how to mend it.
     """
     log = fitter.follower.log
-    probe = _fitter(fitter, _probed(log.recordings), setting.nominal)
-    before = probe.polished(probe.fit(nominal.hypothesis, nominal.levels), rounds=ROUNDS)
-    suspects = [(_undone(probe, setting, before, slip), slip) for slip in slips(setting.nominal)]
-    if not suspects:
+    probe = _Case.of(fitter.follower.simulator, _probed(log.recordings), setting, nominal.levels)
+    mended = [(probe.without(slip), slip) for slip in slips(setting.nominal)]
+    case, slip = max(mended, key=lambda pair: pair[0].nominal_likelihood)
+    if case.nominal_likelihood <= probe.nominal_likelihood:
         return
-    likelihood, slip = max(suspects, key=lambda suspect: suspect[0])
-    if likelihood - before.log_likelihood < OVERWHELMING * before.white.size:
-        return
-    gain = _undone(fitter, setting, nominal, slip) - nominal.log_likelihood
-    if gain > max(OVERWHELMING * nominal.white.size, CLEARLY * (best.log_likelihood - nominal.log_likelihood)):
-        times = np.exp(gain / nominal.white.size)
+    believed = max(probe.nominal_likelihood, probe.likelihood_with(best))
+    gain = (case.best_likelihood() - believed) / probe.values
+    if gain > OVERWHELMING:
         raise InputError(
-            f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from row "
-            f"to row are {times:.2g} times smaller, which no missing effect achieves); {slip.remedy}"
+            f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from "
+            f"row to row are {np.expm1(gain):.0%} smaller than any missing effect makes them); {slip.remedy}"
         )
 
 
@@ -128,9 +130,7 @@ def _units_of_columns(nominal: Model) -> list[Slip]:
         )
     if "x" in plant.coordinates:
         columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
-        found.append(
-            Slip("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns)
-        )
+        found.append(Slip("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
     radius = nominal.parameters.get("wheel_radius", 1.0)
     if "x" in plant.coordinates and abs(np.log(radius)) > ALIKE:
         remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
@@ -179,17 +179,82 @@ def _probed(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
     return tuple(r.between(r.t[0], r.t[0] + PROBE_SPAN) for r in recordings[:PROBE_RECORDINGS])
 
 
-def _fitter(fitter: Fitter, recordings: tuple[Recording, ...], nominal: Model) -> Fitter:
-    return Fitter(Follower.of(fitter.follower.simulator, Log.of(recordings, nominal.plant), nominal))
+@dataclass(frozen=True)
+class _Case:
+    """Recordings beside a description of the robot, as given or with a slip put right.
+
+    Attributes:
+        fitter: Of these recordings.
+        setting: The robot.
+        nominal: Fit of the nominal model; None where that runs away.
+        levels: Where a search for the noise begins.
+        density: Log-likelihood that is due to the units alone.
+    """
+
+    fitter: Fitter
+    setting: Setting
+    nominal: Fit | None
+    levels: NoiseLevels
+    density: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        simulator: AnalyticSimulator,
+        recordings: tuple[Recording, ...],
+        setting: Setting,
+        levels: NoiseLevels,
+        density: float = 0.0,
+    ) -> "_Case":
+        log = Log.of(recordings, setting.nominal.plant)
+        fitter = Fitter(Follower.of(simulator, log, setting.nominal))
+        return cls(fitter, setting, _polished(fitter, Hypothesis.of(setting, (), {}), levels), levels, density)
+
+    @property
+    def values(self) -> int:
+        """How many recorded values count."""
+        log = self.fitter.follower.log
+        return int(log.counted.sum()) * len(log.channels)
+
+    @property
+    def nominal_likelihood(self) -> float:
+        """Log-likelihood with the nominal model, of the recordings in the units that they were logged in."""
+        return self._likelihood(self.nominal)
+
+    def likelihood_with(self, other: Fit) -> float:
+        """The same with the effects of another fit."""
+        return self._likelihood(_polished(self.fitter, other.hypothesis, self.levels))
+
+    def best_likelihood(self) -> float:
+        """The same with the best single effect beside the nominal model."""
+        if self.nominal is None:
+            return -np.inf
+        try:
+            extended = Selection(self.fitter, self.setting, self.nominal).extensions(self.nominal)
+        except np.linalg.LinAlgError:
+            extended = []
+        return max(self._likelihood(fit) for fit in (self.nominal, *extended))
+
+    def without(self, slip: Slip) -> "_Case":
+        """The same recordings with a slip put right."""
+        log = self.fitter.follower.log
+        recordings = tuple(slip.recording(r) for r in log.recordings)
+        model = slip.model(self.setting.nominal)
+        scales = scales_of(model, recordings)
+        factors = slip.factors(log)
+        force = np.array([QUIET_FORCE * scales[site].force for site in log.plant.joints])
+        levels = NoiseLevels(force, self.levels.sensor * factors)
+        density = int(log.counted.sum()) * float(np.log(factors).sum())
+        mended = Setting(model, self.setting.uncertainty, scales)
+        return _Case.of(self.fitter.follower.simulator, recordings, mended, levels, density)
+
+    def _likelihood(self, fit: Fit | None) -> float:
+        return -np.inf if fit is None else fit.log_likelihood + self.density
 
 
-def _undone(fitter: Fitter, setting: Setting, before: Fit, slip: Slip) -> float:
-    """Log-likelihood of the recordings, in the units they were logged in, without the slip."""
-    log = fitter.follower.log
-    mended = replace(setting, nominal=slip.model(setting.nominal))
-    recordings = tuple(slip.recording(r) for r in log.recordings)
-    other = _fitter(fitter, recordings, mended.nominal)
-    factors = slip.factors(log)
-    levels = NoiseLevels(before.levels.force, before.levels.sensor * factors)
-    fit = other.polished(other.fit(Hypothesis.of(mended, (), {}), levels), rounds=ROUNDS)
-    return fit.log_likelihood + int(log.counted.sum()) * float(np.log(factors).sum())
+def _polished(fitter: Fitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit | None:
+    """The best values and noise; None where the model runs away from the recordings."""
+    try:
+        return fitter.polished(fitter.fit(hypothesis, levels), rounds=ROUNDS)
+    except np.linalg.LinAlgError:
+        return None

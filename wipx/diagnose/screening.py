@@ -57,7 +57,9 @@ def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = Fals
 def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, Effect]) -> bool:
     site = name.partition("/")[0]
     others = {f"{site}/{kind}" for kind in effect.excludes}
-    excluding = {p for p in present if f"{p.partition('/')[0]}/{effect.kind}" == name and effect.kind in known[p].excludes}
+    excluding = {
+        p for p in present if f"{p.partition('/')[0]}/{effect.kind}" == name and effect.kind in known[p].excludes
+    }
     return name in present or bool(others & present) or bool(excluding)
 
 

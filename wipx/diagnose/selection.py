@@ -63,7 +63,7 @@ class Selection:
     def score(self, fit: Fit) -> float:
         """Penalised log-likelihood."""
         own = sum(len(fit.hypothesis.parameters_of(effect)) for effect in fit.effects)
-        return fit.log_likelihood - 0.5 * own * np.log(len(fit.white))
+        return fit.log_likelihood - 0.5 * own * np.log(fit.rows)
 
     def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
@@ -71,7 +71,7 @@ class Selection:
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
         gain = larger.log_likelihood - smaller.log_likelihood
         evidence = gain / inflation(larger, self.fitter.follower.log, indices)
-        penalty = 0.5 * len(indices) * np.log(len(larger.white))
+        penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(smaller.log_likelihood - self.nominal.log_likelihood, 0.0)
         return evidence - penalty >= max(LEAST_GAIN, LEAST_SHARE * explained)
 
@@ -111,7 +111,9 @@ class Selection:
             smaller = self.fitted(rest, fit)
             if not self.worthwhile(smaller, fit):
                 self.considered.append(
-                    Candidate(effect, fit.log_likelihood - smaller.log_likelihood, False, "superfluous beside the others")
+                    Candidate(
+                        effect, fit.log_likelihood - smaller.log_likelihood, False, "superfluous beside the others"
+                    )
                 )
                 return self.pruned(smaller) if len(rest) > 1 else smaller
         return fit
@@ -149,12 +151,12 @@ class Selection:
         fits = [self._best_start(fit, by_effect[name][:STARTS]) for name in leading[:CONSIDERED]]
         fits.sort(key=lambda f: -self.score(f))
         gains = [f.log_likelihood - fit.log_likelihood for f in fits]
-        polished = [
-            self.fitter.polished(f) if gain >= CLOSE * max(gains) and i < POLISHED else f
-            for i, (f, gain) in enumerate(zip(fits, gains, strict=True))
-        ]
-        for found in polished:
-            self._fits.setdefault(frozenset(found.effects), found)
+        polished = []
+        for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
+            close = gain >= CLOSE * max(gains) and i < POLISHED
+            polished.append(self.fitter.polished(found) if close else found)
+            if close:
+                self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -self.score(f))
 
     def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:

@@ -7,7 +7,6 @@ likelihood of what remains is that of the recordings.
 
 from dataclasses import dataclass
 
-
 import numpy as np
 
 from wipx.diagnose.log import Log
@@ -32,9 +31,8 @@ class Colour:
 
 
 def colour_of(innovations: np.ndarray, log: Log) -> Colour:
-    """The autoregression of innovations, shape (K + 1, R, m)."""
-    past = _past(innovations, log.counted, LAGS)
-    now = innovations[log.counted]
+    """The autoregression of innovations, shape (R, m, K + 1)."""
+    past, now = _past_and_present(innovations, log.counted, LAGS)
     normal = past.T @ past
     normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal)
     weights = np.linalg.solve(normal, past.T @ now)
@@ -46,51 +44,54 @@ def colour_of(innovations: np.ndarray, log: Log) -> Colour:
 
 
 def whitened(innovations: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
-    """White innovations of the rows that count, shape (P, N, m), of innovations (P, K + 1, R, m)."""
+    """White innovations of (P, R, m, K + 1), of the same shape; zero at rows that do not count."""
     return _whitened(innovations, log.counted, LAGS, colour.weights, colour.whitening)
 
 
 @cached
-def _past(innovations, counted, lags):
-    rows, recordings, m = innovations.shape
+def _past_and_present(innovations, counted, lags):
+    recordings, m, _ = innovations.shape
     past = np.zeros((counted.sum(), len(lags) * m))
+    now = np.zeros((len(past), m))
     n = 0
-    for k in range(rows):
-        for r in range(recordings):
+    for r in range(recordings):
+        for k in range(counted.shape[0]):
             if counted[k, r]:
+                for c in range(m):
+                    now[n, c] = innovations[r, c, k]
                 for i in range(len(lags)):
                     before = k - lags[i]
                     if before >= 0 and counted[before, r]:
                         for c in range(m):
-                            past[n, i * m + c] = innovations[before, r, c]
+                            past[n, i * m + c] = innovations[r, c, before]
                 n += 1
-    return past
+    return past, now
 
 
 @cached
 def _whitened(innovations, counted, lags, weights, whitening):
-    models, rows, recordings, m = innovations.shape
-    out = np.zeros((models, counted.sum(), m))
-    left = np.zeros(m)
-    for p in range(models):
-        n = 0
-        for k in range(rows):
-            for r in range(recordings):
-                if not counted[k, r]:
-                    continue
-                for c in range(m):
-                    left[c] = innovations[p, k, r, c]
+    models, recordings, m, rows = innovations.shape
+    out = np.zeros((models, recordings, m, rows))
+    left = np.zeros((m, rows))
+    for r in range(recordings):
+        first, last = rows, 0
+        for k in range(rows):  # rows that count follow each other
+            if counted[k, r]:
+                first, last = min(first, k), max(last, k)
+        for p in range(models):
+            z = innovations[p, r]
+            for c in range(m):
+                for k in range(first, last + 1):
+                    left[c, k] = z[c, k]
                 for i in range(len(lags)):
-                    before = k - lags[i]
-                    if before >= 0 and counted[before, r]:
-                        for d in range(m):
-                            value = innovations[p, before, r, d]
-                            for c in range(m):
-                                left[c] -= weights[i * m + d, c] * value
-                for c in range(m):
-                    total = 0.0
-                    for d in range(c + 1):
-                        total += whitening[c, d] * left[d]
-                    out[p, n, c] = total
-                n += 1
+                    lag = lags[i]
+                    for d in range(m):
+                        weight = weights[i * m + d, c]
+                        for k in range(first + lag, last + 1):
+                            left[c, k] -= weight * z[d, k - lag]
+            for c in range(m):
+                for d in range(c + 1):
+                    weight = whitening[c, d]
+                    for k in range(first, last + 1):
+                        out[p, r, c, k] += weight * left[d, k]
     return out

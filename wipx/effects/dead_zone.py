@@ -1,7 +1,7 @@
 """Input dead zone: small commands produce no force."""
 
 from wipx.core.effect import Effect
-from wipx.core.law import clip, law
+from wipx.core.law import above, law
 from wipx.core.parameters import Parameter
 
 EFFECT = Effect(
@@ -15,6 +15,6 @@ EFFECT = Effect(
 
 
 @law
-def force(u, band):
-    """Force for the command `u` [N or N m]."""
-    return u - clip(u, -band, band)
+def force(u, band, spread):
+    """Mean force of commands that are spread evenly by +-`spread` about `u`; spread 0 is the plain law."""
+    return above(u - band, spread) - above(-u - band, spread)

@@ -1,6 +1,7 @@
 """Saturation of the actuator's force."""
 
 from wipx.core.effect import Effect
+from wipx.core.law import above, law
 from wipx.core.parameters import Parameter
 
 EFFECT = Effect(
@@ -12,3 +13,9 @@ EFFECT = Effect(
     law="F = clip(u, -F_max, F_max)",
     source="force range of actuators, MuJoCo documentation",
 )
+
+
+@law
+def force(u, limit, spread):
+    """Mean force of commands that are spread evenly by +-`spread` about `u`; spread 0 is the plain law."""
+    return u - above(u - limit, spread) + above(-u - limit, spread)

@@ -17,7 +17,7 @@ EFFECT = Effect(
             -1.0,
             1.0,
             -0.1,
-            grid=(-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75),
+            grid=tuple(0.1 * i for i in range(-10, 10)),
         ),
         Parameter(
             "hi",
@@ -27,7 +27,7 @@ EFFECT = Effect(
             -1.0,
             1.0,
             0.1,
-            grid=(-0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0),
+            grid=tuple(0.1 * i for i in range(-9, 11)),
         ),
     ),
     law="-F_c s(v) for lo <= x <= hi",

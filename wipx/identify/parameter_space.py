@@ -194,15 +194,15 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     speeds = np.concatenate([_speeds(r.t, r[column]) for r in recordings])
     velocity = max(float(np.quantile(np.abs(speeds), 0.99)), 1e-6)
     travel = max(float(np.quantile(np.abs(np.concatenate([r[column] for r in recordings])), 0.99)), 1e-6)
+    commanded = np.zeros(1)
     if site in plant.actuated:
         command = plant.commands[plant.actuated.index(site)]
-        commanded = np.quantile(np.abs(np.concatenate([r[command] for r in recordings])), 0.99) * abs(p["input_gain"])
-    else:
-        commanded = 0.0
-    force = max(float(commanded), _inertia(model, site) * velocity / 0.1)
+        commanded = np.abs(np.concatenate([r[command] for r in recordings])) * abs(p["input_gain"])
+    force = max(float(np.quantile(commanded, 0.99)), _inertia(model, site) * velocity / 0.1)
+    largest = max(float(commanded.max()), 1e-6 * force)
     mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
     length = p.get("com_height", p.get("link1_length", 1.0))
-    return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings))
+    return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings), largest)
 
 
 def _speeds(t: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from wipx.report.diagnosis_words import capitalised
 
 MOST_RUNS = 24  # strips of recordings; more are no longer read
 MOST_REFERENCE_ROWS = 2000
+LEAST_FULL_BAR = 20.0  # nats; where no candidate gains anything, no bar must look long
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,14 @@ def ranked_candidates(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
     return tuple(sorted(diagnosis.candidates, key=lambda c: -c.gain if math.isfinite(c.gain) else math.inf))
 
 
+def full_bar(diagnosis: Diagnosis) -> float:
+    """The gain of a bar of full length [nats]."""
+    return max([LEAST_FULL_BAR, *(c.gain for c in diagnosis.candidates if math.isfinite(c.gain))])
+
+
 def bar_length(gain: float, largest: float) -> float:
     """Length of a bar from 0 to 1, proportional to log(1 + gain): gains of rivals differ by powers of ten."""
-    if not (math.isfinite(gain) and math.isfinite(largest)) or gain <= 0.0 or largest <= 0.0:
-        return 0.0
-    return math.log1p(gain) / math.log1p(largest)
+    return math.log1p(gain) / math.log1p(largest) if math.isfinite(gain) and gain > 0.0 else 0.0
 
 
 def diagnosis_data(diagnosis: Diagnosis) -> dict:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from wipx.core.diagnosis import Candidate, Diagnosis
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report import diagnosis_words as words
-from wipx.report.diagnosis_charts import bar_length, ranked_candidates
+from wipx.report.diagnosis_charts import bar_length, full_bar, ranked_candidates
 from wipx.report.numbers import MISSING, compact, significant
 
 
@@ -161,7 +161,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[EffectRow]:
                 )
                 for number in effect.parameters
             ),
-            evidence=significant(effect.log_evidence_gain),
+            evidence=words.nats(effect.log_evidence_gain),
             heldout_gain=words.percent(effect.heldout_gain),
             probability=words.probability(effect.present_probability),
             share=words.percent(effect.share),
@@ -200,17 +200,16 @@ def site_bars(diagnosis: Diagnosis) -> list[Bar]:
 
 def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
     """What was considered, the largest gain first."""
-    ranked = ranked_candidates(diagnosis)
-    largest = max((c.gain for c in ranked if math.isfinite(c.gain)), default=0.0)
-    return [_candidate_bar(candidate, largest, diagnosis.model.plant.kind) for candidate in ranked]
+    kind, full = diagnosis.model.plant.kind, full_bar(diagnosis)
+    return [_candidate_bar(candidate, full, kind) for candidate in ranked_candidates(diagnosis)]
 
 
-def _candidate_bar(candidate: Candidate, largest: float, plant_kind: str) -> Bar:
+def _candidate_bar(candidate: Candidate, full: float, plant_kind: str) -> Bar:
     return Bar(
         label=words.capitalised(effect_in_words(candidate.name, plant_kind)),
         name=candidate.name,
-        length=100.0 * bar_length(candidate.gain, largest),
-        value=significant(candidate.gain),
+        length=100.0 * bar_length(candidate.gain, full),
+        value=words.nats(candidate.gain),
         remark=candidate.reason,
         chosen=candidate.chosen,
     )

@@ -5,13 +5,13 @@ from wipx.core.words import effect_in_words
 from wipx.report.diagnosis_words import (
     VERDICTS,
     capitalised,
+    nats,
     next_step,
     percent,
     tie_sentence,
     unexplained_sentence,
     value_in_words,
 )
-from wipx.report.numbers import significant
 from wipx.report.outcome import headline
 
 
@@ -34,7 +34,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _effect_lines(effect: FoundEffect, plant_kind: str) -> list[str]:
     values = ", ".join(value_in_words(number) for number in effect.parameters)
-    evidence = f"evidence {significant(effect.log_evidence_gain)} nats, held-out gain {percent(effect.heldout_gain)}"
+    evidence = f"evidence {nats(effect.log_evidence_gain)} nats, held-out gain {percent(effect.heldout_gain)}"
     lines = [f"  {capitalised(effect_in_words(effect.name, plant_kind))}: {values}; {evidence}"]
     tie = tie_sentence(effect, plant_kind)
     return [*lines, f"    {tie}"] if tie else lines

@@ -8,7 +8,6 @@ from wipx.core.diagnosis import Diagnosis, FoundEffect, NextExperiment, Period, 
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
-from wipx.report.outcome import held_out_errors
 
 VERDICTS = MappingProxyType(
     {
@@ -49,6 +48,13 @@ def probability(value: float) -> str:
     if value > SURE:
         return f"> {100.0 * SURE:.1f} %"
     return f"{100.0 * value:.1f} %" if value >= 1.0 - SURE else f"< {100.0 * (1.0 - SURE):.1f} %"
+
+
+def nats(value: float) -> str:
+    """A log-likelihood with the digits that matter: no more than one decimal; a dash where there is none."""
+    if not math.isfinite(value):
+        return MISSING
+    return f"{value:.0f}" if abs(value) >= 99.95 else f"{value + 0.0:.1f}"
 
 
 def p_value(value: float) -> str:
@@ -125,21 +131,11 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     return sentence
 
 
-def held_out_words(diagnosis: Diagnosis) -> str:
-    """What the errors were judged on."""
-    return "held-out recordings" if held_out_errors(diagnosis) else "the fitted recordings (none were held out)"
-
-
 def next_step(following: NextExperiment | None) -> str | None:
     """What to record next and why, as text; None where nothing is open."""
     if following is None:
         return None
     return f"{_ended(following.question)} {_ended(following.best.how)}"
-
-
-def separation(value: float) -> str:
-    """A separation in standard deviations, e.g. "12 standard deviations"; a dash where there is none."""
-    return f"{significant(value, 2)} standard deviations" if math.isfinite(value) else MISSING
 
 
 def _interval(low: float, high: float, unit: str) -> str:

@@ -125,7 +125,7 @@ def held_out_errors(result: ModelComparison) -> FitErrors | None:
 
 def windows_by_part(result: ModelComparison) -> dict[str, int]:
     """Number of windows behind the errors of `HELD_OUT` and `FIT`."""
-    return {label: errors.windows for label, errors in _parts(result)}
+    return {HELD_OUT: 0, **{label: errors.windows for label, errors in _parts(result)}}
 
 
 def headline(result: ModelComparison, arrow: str = "->") -> str:

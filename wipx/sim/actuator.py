@@ -6,7 +6,7 @@ a loop over the lanes of a block and is skipped where it is absent (see `wipx.si
 
 from wipx.core.law import clip, inlined, law, sign, sin_cos
 from wipx.effects import backlash as backlash_law
-from wipx.effects import dead_zone, speed_limit
+from wipx.effects import dead_zone, saturation, speed_limit
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
@@ -63,12 +63,12 @@ def actuator_path(S, on, j):
             S[u + w] += S[R.OFFSET * W + w]
     if on[R.ON_DEAD_ZONE]:
         for w in range(W):
-            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w])
+            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w], S[R.SPREAD * W + w])
     for w in range(W):
         S[u + w] *= S[R.GAIN * W + w]
     if on[R.ON_SATURATION]:
         for w in range(W):
-            S[u + w] = clip(S[u + w], -S[R.FORCE_MAX * W + w], S[R.FORCE_MAX * W + w])
+            S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[R.SPREAD * W + w])
     if on[R.ON_SPEED_LIMIT]:
         for w in range(W):
             S[u + w] = speed_limit.limited(S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w])

@@ -227,6 +227,10 @@ class _Run:
             ramps[:, [joint_index(site) for site in self.plant.actuated]] = self.inputs.ramps
             self.coefficients.present[R.ON_RAMP] = True
 
+        spread = np.zeros(self.inputs.windows)
+        if not per_lane and self.inputs.spread is not None:
+            spread = self.inputs.spread
+
         def work(begin: int, end: int) -> None:
             rollout(
                 self.coefficients.rows,
@@ -236,6 +240,7 @@ class _Run:
                 self.inputs.t,
                 commands,
                 ramps,
+                spread,
                 self.row_steps,
                 self.substeps,
                 per_lane,
@@ -269,6 +274,8 @@ class _Run:
             return NO_FEEDBACK, NO_OBSERVER, np.zeros(1, dtype=np.int64)
         measured = np.zeros((self.rows + 1, 4, self.inputs.windows))
         measured[:, self.pattern] = observer.recorded
+        if len(self.pattern) == 4:
+            return measured, observer.gains, observer.group.astype(np.int64)
         gains = np.zeros((*observer.gains.shape[:3], 4, 4))
         gains[..., np.array(self.pattern)[:, None], self.pattern] = observer.gains
         return measured, gains, observer.group.astype(np.int64)

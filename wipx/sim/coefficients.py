@@ -12,6 +12,7 @@ import numpy as np
 from wipx.core.model import ModelBatch
 from wipx.effects.lagged_stribeck import lag_of
 from wipx.effects.payload import loaded
+from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
 
 FASTEST_LAG = 1e-12  # [s]; a lag of zero is one that settles at once
@@ -238,6 +239,14 @@ def _joint(f: _Filler, site: str, j: int) -> None:
         # A bristle without a level slides at once; from rest it would first be a spring.
         held = np.maximum(f.rows[R.SLIDING + j], f.rows[R.PEAK + j]) > 0.0
         f.rows[[R.BRISTLE + j, R.BRISTLE_DAMPING + j]] *= held
+    _remainder(f, site, j)
+    swing = f.values(f"{site}/resonance")
+    if swing is not None:
+        f.present[R.ON_SWING + j] = True
+        pulsation = 2.0 * np.pi * swing["f"]
+        f.rows[R.SWING + j] = swing["m"]
+        f.rows[R.SWING_STIFFNESS + j] = pulsation**2
+        f.rows[R.SWING_DAMPING + j] = 2.0 * swing["zeta"] * pulsation
     paper = f.values(f"{site}/lagged_stribeck")
     if paper is not None:
         f.present[R.ON_PAPER + j] = True
@@ -250,6 +259,18 @@ def _joint(f: _Filler, site: str, j: int) -> None:
         ):
             f.rows[row + j] = paper[symbol]
         f.rows[R.PAPER_RATE + j] = 1.0 / np.maximum(lag_of(paper["alpha"]), FASTEST_LAG)
+
+
+def _remainder(f: _Filler, site: str, j: int) -> None:
+    values = f.values(f"{site}/remainder")
+    if values is None:
+        return
+    f.present[R.ON_REMAINDER + j] = True
+    for symbol, row in (("signal", R.REMAINDER_SIGNAL), ("factor", R.REMAINDER_FACTOR), ("low", R.REMAINDER_LOW)):
+        f.rows[row + j] = values[symbol]
+    f.rows[R.REMAINDER_PER_UNIT + j] = (KNOTS - 1) / np.maximum(values["high"] - values["low"], 1e-12)
+    for i in range(KNOTS):
+        f.rows[R.REMAINDER + 2 * i + j] = values[f"f{i}"]
 
 
 def _sensor(f: _Filler, site: str, j: int) -> None:

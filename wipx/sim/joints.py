@@ -11,6 +11,7 @@ Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, ch. 10).
 from wipx.core.law import clip, inlined, law, maximum
 from wipx.effects import lagged_stribeck, load_friction, quadratic_drag, sticky_spot, stribeck
 from wipx.effects.presliding import bristle, bristle_rate
+from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
@@ -62,6 +63,17 @@ def smooth_friction(S, on, j):
             S[(R.DAMPING + j) * W + w] += stiffness * mean_gain * h + damping * gain
             S[(R.BRISTLE_KEPT + j) * W + w] = kept
             S[(R.BRISTLE_GAIN + j) * W + w] = gain * h
+    if on[R.ON_REMAINDER + j]:
+        remainder(S, j)
+    if on[R.ON_SWING + j]:
+        for w in range(W):
+            h = S[R.STEP * W + w]
+            stiffness, damping = S[(R.SWING_STIFFNESS + j) * W + w], S[(R.SWING_DAMPING + j) * W + w]
+            place, rate = S[(R.SWING_PLACE + j) * W + w], S[(R.SWING_RATE + j) * W + w]
+            rate -= h * (S[(R.ACCELERATION + j) * W + w] + stiffness * place + damping * rate)
+            place += h * rate
+            S[(R.SWING_RATE + j) * W + w], S[(R.SWING_PLACE + j) * W + w] = rate, place
+            S[(R.FORCE + j) * W + w] += S[(R.SWING + j) * W + w] * (stiffness * place + damping * rate)
     if on[R.ON_PAPER + j]:
         for w in range(W):
             steady = lagged_stribeck.resistance(
@@ -77,6 +89,29 @@ def smooth_friction(S, on, j):
             after = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
             S[(R.PAPER + j) * W + w] = after if S[R.STEP * W + w] > 0.0 else before
             S[(R.FORCE + j) * W + w] -= steady + rest * S[(R.PAPER_MEAN + j) * W + w]
+
+
+@inlined
+def remainder(S, j):
+    """The piecewise linear force of joint j over one signal."""
+    for w in range(W):
+        code = int(S[(R.REMAINDER_SIGNAL + j) * W + w])
+        if code < 2:
+            signal = S[(R.MID + code) * W + w]
+        elif code < 4:
+            signal = S[(R.RATE + code - 2) * W + w]
+        elif code < 6:
+            signal = S[(R.COMMAND + code - 4) * W + w]
+        else:
+            signal = S[R.TIME * W + w]
+        place = (signal - S[(R.REMAINDER_LOW + j) * W + w]) * S[(R.REMAINDER_PER_UNIT + j) * W + w]
+        place = clip(place, 0.0, KNOTS - 1.000001)
+        knot = int(place)
+        low, high = S[(R.REMAINDER + 2 * knot + j) * W + w], S[(R.REMAINDER + 2 * knot + 2 + j) * W + w]
+        force = low + (place - knot) * (high - low)
+        share = S[(R.REMAINDER_FACTOR + j) * W + w]
+        command = S[(R.COMMAND + j) * W + w]
+        S[(R.FORCE + j) * W + w] += force * ((1.0 - share) + share * command)
 
 
 @law

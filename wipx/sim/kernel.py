@@ -88,7 +88,7 @@ def begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k):
         n = numbers[window]
         counts[w] = n
         least, most = min(least, n), max(most, n)
-    if on[R.ON_DELAY] or on[R.ON_EVENT]:
+    if on[R.ON_DELAY] or on[R.ON_EVENT] or on[R.ON_REMAINDER] or on[R.ON_REMAINDER1]:
         times = t_rows[k]
         for w in range(W):
             S[R.TIME * W + w] = times[lanes[0, w]]
@@ -147,6 +147,7 @@ def rollout(
     t_rows,
     u_rows,
     ramps,
+    spread,
     row_steps,
     substeps,
     per_lane,
@@ -176,6 +177,7 @@ def rollout(
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, 2, lanes) if `per_lane` (written in closed loop), else (K, 2, R).
         ramps: Change of each command along a row, shape (K, 2, R); else (1, 2, 1).
+        spread: Half width of the single commands about their mean, shape (R,).
         row_steps: Length of the steps from each row to the next, shape (K, R) [s].
         substeps: Their number, shape (K, R); 0 holds the state.
         per_lane: Whether every lane has commands of its own.
@@ -207,6 +209,7 @@ def rollout(
             lanes[0, w] = lane % windows
             lanes[1, w] = lane if per_lane else lane % windows
             pointers[w] = 0
+            S[R.SPREAD * W + w] = spread[lanes[0, w]]
             for i in range(R.N_COEFFICIENTS):
                 S[i * W + w] = coefficients[i, lane // windows]
             for i in range(R.STATES):

@@ -23,10 +23,14 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     BRISTLE, BRISTLE1, BRISTLE_DAMPING, BRISTLE_DAMPING1, SLIDING, SLIDING1, PEAK, PEAK1, PEAK_SPEED, PEAK_SPEED1,
     PAPER_STATIC, PAPER_STATIC1, PAPER_COULOMB, PAPER_COULOMB1, PAPER_SPEED, PAPER_SPEED1,
     PAPER_VISCOUS, PAPER_VISCOUS1, PAPER_EPSILON, PAPER_EPSILON1, PAPER_RATE, PAPER_RATE1,
+    REMAINDER_SIGNAL, REMAINDER_SIGNAL1, REMAINDER_FACTOR, REMAINDER_FACTOR1, REMAINDER_LOW, REMAINDER_LOW1,
+    REMAINDER_PER_UNIT, REMAINDER_PER_UNIT1, REMAINDER, REMAINDER1,  # the first knot of each joint, then the others
+    _R2, _R3, _R4, _R5, _R6, _R7, _R8, _R9, _R10, _R11, _R12, _R13, _R14, _R15, _R16, _R17,
+    SWING, SWING1, SWING_STIFFNESS, SWING_STIFFNESS1, SWING_DAMPING, SWING_DAMPING1,  # per mass
     SMOOTHING, SMOOTHING1,  # speed over which dry friction builds up, 0 for sticking
     BIAS, BIAS1, SCALE, SCALE1, SENSOR_DELAY, SENSOR_DELAY1,
     N_COEFFICIENTS,
-) = range(89)  # fmt: skip
+) = range(121)  # fmt: skip
 
 # State of a rollout, carried from step to step.
 (
@@ -36,9 +40,10 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     PAPER, PAPER1,  # lagged friction
     LAGGED, LAGGED1,  # actuator
     PLACE, PLACE1, DRIVE_SPEED, DRIVE_SPEED1,  # backlash
+    SWING_PLACE, SWING_PLACE1, SWING_RATE, SWING_RATE1,
     STARTED,  # 0 before the first step, then 1
     N_STATES,
-) = range(N_COEFFICIENTS, N_COEFFICIENTS + 18)  # fmt: skip
+) = range(N_COEFFICIENTS, N_COEFFICIENTS + 22)  # fmt: skip
 
 # Scratch of one step.
 (
@@ -46,6 +51,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     LAG_KEPT, LAG_MEAN, PAPER_KEPT, PAPER_KEPT1, PAPER_MEAN, PAPER_MEAN1,  # of lags over one step
     MID, MID1, RATE, RATE1,  # coordinates and rates in mid-step
     COMMAND, COMMAND1, DRIVE, DRIVE1,  # command now, and the force that comes of it
+    SPREAD,  # half width of the single commands about their mean
     RAMP, RAMP1, PHASE, PER_ROW,  # change of the command along the row, place in the row, one over its steps
     M11, M12, M22, COUPLING_NOW, GRAVITY_NOW,
     W11, W12, W22, YIELD, YIELD1, NEXT, NEXT1,  # inverse of the mass matrix, rates at the end
@@ -56,7 +62,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 61)  # fmt: skip
+) = range(N_STATES, N_STATES + 62)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 
@@ -66,6 +72,6 @@ STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
     ON_DELAY, ON_OFFSET, ON_DEAD_ZONE, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG, ON_RIPPLE, ON_BACKLASH,
     ON_DAMPING, ON_DRAG, ON_DRAG1, ON_FRICTION, ON_STRIBECK, ON_STRIBECK1, ON_SPOT, ON_LOAD, ON_LOAD1,
     ON_BRISTLE, ON_BRISTLE1, ON_PAPER, ON_PAPER1, ON_SENSOR_DELAY, ON_SMOOTHING,
-    ON_RAMP,
+    ON_RAMP, ON_REMAINDER, ON_REMAINDER1, ON_SWING, ON_SWING1,
     N_FLAGS,
-) = range(30)  # fmt: skip
+) = range(34)  # fmt: skip

@@ -137,7 +137,10 @@ def _unseen_errors(folder: Path, answer: Path, time_limit: float) -> UnseenError
     if _call("predict", folder / "unseen", folder / "prediction", time_limit, model):
         return None
     metrics = read_json(folder / "prediction" / "metrics.json")
-    return UnseenErrors(metrics["rms_nominal"], metrics["rms"], read_json(folder / TRUTH)["noise"])
+    # the sensors' noise is known; what it does to the state from which a prediction starts comes on top
+    sensors, propagated = read_json(folder / TRUTH)["noise"], metrics["noise_floor"]
+    floor = {name: max(noise, propagated[name] or 0.0) for name, noise in sensors.items()}
+    return UnseenErrors(metrics["rms_nominal"], metrics["rms"], floor)
 
 
 def _call(task: str, recordings: Path, out: Path, time_limit: float, *more: str) -> str:

@@ -8,26 +8,21 @@ function heat(more) {
   };
 }
 
-function colourBar() {
-  return {
-    title: { text: isNarrow() ? "nats" : "excess [nats per row]", side: "right", font: { size: 12 } },
-    thickness: 12, outlinewidth: 0, tickfont: { size: 11 }, len: 1, y: 0.5,
-  };
-}
+const COLOUR_BAR = { thickness: 12, outlinewidth: 0, tickfont: { size: 11 }, len: 1, y: 0.5, nticks: 5 };
 
 function drawMap() {
   const element = document.getElementById("map-chart");
   const [across, up] = data.map.signals;
   const units = data.map.units;
   Plotly.react(element, [heat({
-    x: data.map.edges[0], y: data.map.edges[1], z: data.map.excess, zmax: data.map.top, colorbar: colourBar(),
+    x: data.map.edges[0], y: data.map.edges[1], z: data.map.excess, zmax: data.map.top, colorbar: COLOUR_BAR,
     hovertemplate: `${plain(across)} %{x:.3~g} ${plain(units[0])}<br>${plain(up)} %{y:.3~g} ${plain(units[1])}`
       + "<br>excess %{z:.3~g} nats per row<extra></extra>",
   })], layout(element, {
     height: isPrinting() ? 280 : 380, margin: { l: 64, r: 12, t: 12, b: 48 },
     xaxis: axis({ title: { text: withUnit(across, units[0]), standoff: 6, font: { size: 13 } }, showgrid: false, zeroline: false }),
     yaxis: axis({ title: { text: withUnit(up, units[1]), font: { size: 13 } }, showgrid: false, zeroline: false }),
-  }), { ...config, displayModeBar: !isNarrow() });
+  }), { ...config, displayModeBar: false });
 }
 
 function drawStrips() {
@@ -35,18 +30,18 @@ function drawStrips() {
   const { runs, edges, excess, top } = data.strips;
   const traces = runs.map((run, row) => heat({
     x: edges[row], y: [row - 0.42, row + 0.42], z: [excess[row]], zmax: top,
-    showscale: row === 0, colorbar: colourBar(),
+    showscale: row === 0, colorbar: COLOUR_BAR,
     hovertemplate: `${plain(run)}<br>t = %{x:.3~g} s<br>excess %{z:.3~g} nats per row<extra></extra>`,
   }));
   const names = runs.map((run) => plain(run.length > 28 ? `${run.slice(0, 26)}…` : run));
   Plotly.react(element, traces, layout(element, {
-    height: Math.max(130, 64 + (isPrinting() ? 18 : 26) * runs.length), margin: { l: 64, r: 12, t: 8, b: 48 },
+    height: Math.max(150, 64 + (isPrinting() ? 18 : 26) * runs.length), margin: { l: 64, r: 12, t: 8, b: 48 },
     xaxis: axis({ title: { text: "time [s]", standoff: 6, font: { size: 13 } }, showgrid: false, zeroline: false }),
     yaxis: axis({
       tickmode: "array", tickvals: runs.map((_, row) => row), ticktext: names, autorange: false, ticks: "",
       range: [runs.length - 0.5, -0.5], showgrid: false, zeroline: false,
     }),
-  }), { ...config, displayModeBar: !isNarrow() });
+  }), { ...config, displayModeBar: false });
 }
 
 /* Laws on the data */

@@ -1,0 +1,243 @@
+"""What a fit leaves over: forces of any shape, tested on its innovations.
+
+Score tests of forces over position, speed, angle, command and time, of a command whose gain drifts and
+of resonances, on each joint (after Kristensen, Madsen, Jorgensen 2004, and the model-error models of
+Ljung 1999, System Identification, sec. 16.6). They say whether something is left, where, and what it looks like.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnose.follower import Follower
+from wipx.diagnose.log import Log
+from wipx.diagnose.observer import Gains, Linearisation, transition_over
+from wipx.diagnose.robust import stretches, sums_over
+from wipx.diagnose.whiteness import whitened
+from wipx.effects.remainder import KNOTS
+from wipx.sim.cache import cached
+
+ENDS = (0.005, 0.995)  # quantiles of a signal between which its knots lie
+RATE_SPAN = 0.03  # [s] over which rates are differenced where none is recorded
+FREQUENCIES = np.geomspace(0.5, 16.0, 12)  # [Hz] of resonances that are looked for
+DAMPING = 0.05  # ratio, of the same
+RIDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A family of forces on one joint.
+
+    Attributes:
+        joint: Its index.
+        kind: "force" over a signal, "gain" (share of the command over a signal) or "resonance".
+        signal: Column, rate or command; "t" for time, a frequency for a resonance [Hz].
+        knots: Where the forces are given, shape (KNOTS,); empty for a resonance.
+        columns: Forces of unit size at every row, shape (C, K + 1, R).
+    """
+
+    joint: int
+    kind: str
+    signal: str
+    knots: np.ndarray
+    columns: np.ndarray
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """A family of forces that a fit leaves over.
+
+    Attributes:
+        shape: The family.
+        gain: Log-likelihood that it would add, in nats.
+        p_value: Of that gain if nothing were left over, not yet corrected for the number of families.
+        slopes: Of the white innovations by the forces, freed of the fit's own, shape (R m (K + 1), C).
+    """
+
+    shape: Shape
+    gain: float
+    p_value: float
+    slopes: np.ndarray
+
+
+def signals_of(follower: Follower) -> dict[str, np.ndarray]:
+    """Recorded coordinates, rates, commands and time at every row, shape (K + 1, R) each."""
+    log = follower.log
+    plant = log.plant
+    signals: dict[str, np.ndarray] = {}
+    for j, name in enumerate(plant.coordinates):
+        signals[name] = log.measured[:, j]
+    for j, name in enumerate(plant.rates):
+        signals[name] = log.measured[:, log.joints + j] if log.joints + j in log.channels else _rates(follower, j)
+    for c, name in enumerate(plant.commands):
+        commands = log.inputs.commands[:, c]
+        signals[name] = np.concatenate([commands, commands[-1:]])
+    signals["t"] = np.where(log.rows, log.inputs.t, 0.0)
+    return signals
+
+
+def shapes_of(follower: Follower) -> list[Shape]:
+    """All families of forces that are looked at."""
+    log = follower.log
+    signals = signals_of(follower)
+    found = []
+    for joint, site in enumerate(log.plant.joints):
+        for name, values in signals.items():
+            knots, hats = _hats(values, log.rows)
+            if knots is not None:
+                found.append(Shape(joint, "force", name, knots, hats))
+        if site in log.plant.actuated:
+            command = signals[log.plant.commands[log.plant.actuated.index(site)]]
+            knots, hats = _hats(signals["t"], log.rows)
+            if knots is not None:
+                found.append(Shape(joint, "gain", "t", knots, hats * command))
+        forces, rates = _swings(follower, joint, signals)
+        found += [
+            Shape(joint, "resonance", f"{frequency:.2g}", np.zeros(0), np.stack([forces[i], rates[i]]))
+            for i, frequency in enumerate(FREQUENCIES)
+        ]
+    return found
+
+
+def leftovers(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+    """What each family of forces would add to a fit, the most significant first."""
+    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
+    white = fit.white.ravel()
+    own = fit.jacobian[: white.size]
+    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
+    left = white - basis @ (basis.T @ white)
+    labels = np.repeat(stretches(fitter.follower.log)[:, None], fit.white.shape[1], axis=1).ravel()
+    found = [_tested(fitter, fit, gains, shape, basis, left, labels) for shape in shapes]
+    return sorted(found, key=lambda leftover: leftover.p_value)
+
+
+def _tested(
+    fitter: Fitter, fit: Fit, gains: Gains, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
+) -> Leftover:
+    log = fitter.follower.log
+    innovations = _answers(fitter.follower.linear, gains, shape, log)
+    slopes = whitened(innovations, fit.colour, log).reshape(len(shape.columns), -1).T
+    slopes = slopes - basis @ (basis.T @ slopes)
+    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    scaled = slopes / size
+    normal = scaled.T @ scaled + RIDGE * np.eye(len(size))
+    score = scaled.T @ left
+    gain = 0.5 * float(score @ np.linalg.solve(normal, score))
+    parts = sums_over(labels, scaled * left[:, None])
+    # By how much scores vary more from stretch to stretch than white innovations would have it.
+    inflation = max(1.0, float(np.mean(np.sum(parts**2, axis=0))))
+    degrees = int(np.linalg.matrix_rank(normal, tol=1e-6))
+    p_value = stats.chi2.sf(2.0 * gain / inflation, degrees)
+    return Leftover(shape, gain, float(p_value), slopes)
+
+
+def _answers(linear: Linearisation, gains: Gains, shape: Shape, log: Log) -> np.ndarray:
+    """Change of the innovations by each force of a family, shape (C, R, m, K + 1)."""
+    return _driven(
+        linear.a,
+        linear.b[:, :, shape.joint].copy(),
+        linear.place,
+        log.intervals,
+        log.inputs.last,
+        log.channels,
+        gains.gains,
+        gains.whitening,
+        shape.columns,
+    )
+
+
+@cached
+def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
+    columns, rows, recordings = forces.shape
+    joints = a.shape[1]
+    n, m = 2 * joints, len(channels)
+    out = np.zeros((columns, recordings, m, rows))
+    transition = np.zeros((n, n))
+    state, moved = np.zeros(n), np.zeros(n)
+    states = np.zeros((columns, n))
+    for r in range(recordings):
+        states[:] = 0.0
+        for k in range(last[r] + 1):
+            inside = k < last[r]
+            if inside:
+                dt, g = intervals[k, r], place[k, r]
+                transition_over(a[g], dt, transition)
+            for c in range(columns):
+                state[:] = states[c]
+                for d in range(m):
+                    total = 0.0
+                    for e in range(d + 1):
+                        total -= whitening[k, r, d, e] * state[channels[e]]
+                    out[c, r, d, k] = total
+                if not inside:
+                    continue
+                for i in range(n):
+                    moved[i] = state[i]
+                    for d in range(m):
+                        moved[i] -= gains[k, r, i, channels[d]] * state[channels[d]]
+                force = forces[c, k, r]
+                for i in range(n):
+                    total = b[g, i % joints] * force * (0.5 * dt * dt if i < joints else dt)
+                    for l in range(n):
+                        total += transition[i, l] * moved[l]
+                    states[c, i] = total
+    return out
+
+
+def _hats(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:
+    """Knots over a signal and the piecewise linear basis on them, shape (KNOTS, K + 1, R)."""
+    low, high = np.quantile(values[rows], ENDS)
+    if not high - low > 1e-9 * max(abs(high), abs(low), 1e-9):
+        return None, np.zeros(0)
+    knots = np.linspace(low, high, KNOTS)
+    place = np.clip((values - low) / (high - low), 0.0, 1.0) * (KNOTS - 1)
+    hats = np.maximum(1.0 - np.abs(place - np.arange(KNOTS)[:, None, None]), 0.0)
+    return knots, hats * rows
+
+
+def _rates(follower: Follower, joint: int) -> np.ndarray:
+    """Rates of a coordinate by central differences over `RATE_SPAN`, shape (K + 1, R)."""
+    log = follower.log
+    rates = np.zeros(log.rows.shape)
+    for r, recording in enumerate(log.recordings):
+        t, q = recording.t, recording[log.plant.coordinates[joint]]
+        rows = np.arange(len(t))
+        reach = max(1, round(0.5 * RATE_SPAN * recording.rate))
+        before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(t) - 1)
+        rates[: len(t), r] = (q[after] - q[before]) / (t[after] - t[before])
+    return rates
+
+
+def _swings(follower: Follower, joint: int, signals: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Force of a unit mass that swings along with a joint, and its rate, shape (len(FREQUENCIES), K + 1, R) each."""
+    log = follower.log
+    q, rate = signals[log.plant.coordinates[joint]], signals[log.plant.rates[joint]]
+    pulsation = 2.0 * np.pi * FREQUENCIES
+    return _swung(q, rate, log.intervals, pulsation, DAMPING)
+
+
+@cached
+def _swung(q, rate, intervals, pulsation, damping):
+    rows, recordings = q.shape
+    forces = np.zeros((len(pulsation), rows, recordings))
+    rates = np.zeros((len(pulsation), rows, recordings))
+    for i in range(len(pulsation)):
+        stiffness, loss = pulsation[i] ** 2, 2.0 * damping * pulsation[i]
+        for r in range(recordings):
+            place, speed = q[0, r], rate[0, r]
+            for k in range(rows):
+                forces[i, k, r] = stiffness * (place - q[k, r]) + loss * (speed - rate[k, r])
+                rates[i, k, r] = speed - rate[k, r]
+                if k == rows - 1:
+                    break
+                steps = max(1, int(np.ceil(intervals[k, r] * pulsation[i] * 10.0)))
+                h = intervals[k, r] / steps
+                for s in range(steps):
+                    share = (s + 0.5) / steps
+                    base = q[k, r] + share * (q[k + 1, r] - q[k, r])
+                    moving = rate[k, r] + share * (rate[k + 1, r] - rate[k, r])
+                    speed -= h * (stiffness * (place - base) + loss * (speed - moving))
+                    place += h * speed
+    return forces, rates

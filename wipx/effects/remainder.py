@@ -1,0 +1,28 @@
+"""A force that no physics is known for: piecewise linear over one signal.
+
+It stands in for what a diagnosis cannot name. Its curve is drawn from a Gaussian process prior in
+`wipx.diagnose.remainder`; here it is only evaluated.
+"""
+
+from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.parameters import Parameter
+
+KNOTS = 9
+COORDINATES, RATES, COMMANDS, TIME = (0, 1), (2, 3), (4, 5), 6  # codes of the signals, by joint
+HIGHEST = 1e9
+
+EFFECT = Effect(
+    kind="remainder",
+    sites=JOINT_SITES,
+    parameters=(
+        Parameter("signal", "0, 1 coordinates, 2, 3 rates, 4, 5 commands, 6 time", "ratio", 0.0, 0.0, 6.0, 0.0),
+        Parameter("factor", "0 for a force, 1 for a share of the command", "ratio", 0.0, 0.0, 1.0, 0.0),
+        Parameter("low", "first knot, in the unit of the signal", "ratio", 0.0, -HIGHEST, HIGHEST, 0.0),
+        Parameter("high", "last knot", "ratio", 1.0, -HIGHEST, HIGHEST, 1.0),
+        *(Parameter(f"f{i}", f"force at knot {i}", "force", 0.0, -2.0, 2.0, 0.0) for i in range(KNOTS)),
+    ),
+    law="+ f(signal), piecewise linear between nine knots",
+    linear_in=tuple(f"f{i}" for i in range(KNOTS)),
+    source="Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, ch. 2",
+    beyond=True,
+)
