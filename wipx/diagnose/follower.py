@@ -62,7 +62,9 @@ class Follower:
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
         shown = self.simulator.follow(batch, log.inputs, start, Observer(log.measured, corrections, group))
-        return _innovations(log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last)
+        return _innovations(
+            log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last
+        )
 
     @cached_property
     def _first_rows(self) -> np.ndarray:

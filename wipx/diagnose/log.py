@@ -22,6 +22,7 @@ class Log:
         inputs: Times and commands of all rows.
         measured: Recorded coordinates, then rates, shape (K + 1, 2 joints, R); zero where not recorded.
         channels: Which of these are recorded, indices (m,); coordinates always.
+        left_out: A recording whose rows do not count; None for none.
     """
 
     plant: Plant
@@ -29,6 +30,7 @@ class Log:
     inputs: Inputs
     measured: np.ndarray
     channels: np.ndarray
+    left_out: int | None = None
 
     @classmethod
     def of(cls, recordings: tuple[Recording, ...], plant: Plant) -> "Log":
@@ -59,7 +61,8 @@ class Log:
     @cached_property
     def counted(self) -> np.ndarray:
         """Rows that count, shape (K + 1, R): not those in which the state is still settling."""
-        return self.rows & (self.inputs.t >= self.inputs.t[0] + SETTLES)
+        settled = self.rows & (self.inputs.t >= self.inputs.t[0] + SETTLES)
+        return settled & (np.arange(self.inputs.windows) != self.left_out)
 
     @cached_property
     def intervals(self) -> np.ndarray:

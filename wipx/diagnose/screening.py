@@ -29,11 +29,13 @@ class Prospect:
         effect: Its name.
         gain: What adding it is expected to gain, in nats.
         values: Where a fit should start, by "site/kind.symbol" [SI].
+        deviation: Standard deviation of its first number [SI]; infinite where it has a threshold.
     """
 
     effect: str
     gain: float
     values: Mapping[str, float]
+    deviation: float = np.inf
 
 
 def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = False) -> list[Prospect]:
@@ -94,10 +96,11 @@ def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Ef
             if grown.any():
                 dose = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
             values = np.where(grown, neutral + dose * (atom - neutral), atom)
-            if dose == 0.0 or np.any(values < low) or np.any(values > high):
+            if size[i] == 0.0 or np.any(values < low) or np.any(values > high):
                 continue
             gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
-            found.append(Prospect(name, float(gain), dict(zip(names, values.tolist(), strict=True))))
+            deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
+            found.append(Prospect(name, float(gain), dict(zip(names, values.tolist(), strict=True)), float(deviation)))
     return found
 
 

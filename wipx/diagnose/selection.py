@@ -53,6 +53,8 @@ class Selection:
         while len(current.effects) < MOST_EFFECTS:
             extended = self.extensions(current)
             best = self.preferred(extended)
+            if best is not None:
+                current = self.caught_up(current, best)
             if best is None or not self.worthwhile(current, best):
                 self._remember(current, extended, None)
                 break
@@ -81,6 +83,20 @@ class Selection:
         if key not in self._extensions:
             self._extensions[key] = self._extended(fit)
         return self._extensions[key]
+
+    def caught_up(self, fit: Fit, larger: Fit) -> Fit:
+        """A fit, or a better one of the same effects that starts from the noise of a larger fit.
+
+        A search over noise levels that stopped early would credit the next effect with finishing it.
+        """
+        again = self.fitter.fit(fit.hypothesis, larger.levels)
+        if again.log_likelihood < fit.log_likelihood + 1.0:
+            return fit
+        again = self.fitter.polished(again)
+        if not fit.effects:
+            self.nominal = again
+        self._fits[frozenset(fit.effects)] = again
+        return again
 
     def preferred(self, fits: list[Fit]) -> Fit | None:
         """The best fit, or a simpler one that is as good."""

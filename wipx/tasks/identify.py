@@ -21,7 +21,7 @@ from wipx.report.tables import summary
 from wipx.sim.analytic import StateFeedback
 from wipx.tasks.job import Job
 from wipx.tasks.progress import SearchProgress
-from wipx.tasks.results import write_csv, write_json, written_together
+from wipx.tasks.results import flat, write_csv, write_json, written_together
 
 
 @dataclass(frozen=True)
@@ -186,18 +186,9 @@ def _track(job: Job, result: IdentificationResult) -> None:
     names = ("model.yaml", "metrics.json", "report.html", "fit.png", "search.png", "search.csv")
     job.part("tracking").log(
         result.title,
-        _flat(job.settings),
+        flat(job.settings),
         figures,
         {"search/best_loss": np.column_stack([history.evaluations, history.best_loss])},
         [job.out / name for name in names],
         {"plant": result.plant, "source": result.source},
     )
-
-
-def _flat(settings: Mapping[str, object], prefix: str = "") -> dict[str, object]:
-    """Nested settings as one level, "optimizer.starts", so that runs compare."""
-    flat: dict[str, object] = {}
-    for key, value in settings.items():
-        name = f"{prefix}{key}"
-        flat |= _flat(value, f"{name}.") if isinstance(value, Mapping) and value else {name: value}
-    return flat

@@ -2,19 +2,17 @@
 
 import sys
 from types import TracebackType
+from typing import Self
 
 from tqdm import tqdm
 
 from wipx.identify.optimizers.search import Progress
 
 
-class SearchProgress:
-    """A bar over the parts of a search; used as its watcher.
+class _Bar:
+    """A bar with the time left, on a terminal only."""
 
-    A search that is made once more, with other weights, begins the bar anew.
-    """
-
-    def __init__(self, label: str = "identify") -> None:
+    def __init__(self, label: str) -> None:
         self._bar = tqdm(
             total=100,
             desc=label,
@@ -24,17 +22,39 @@ class SearchProgress:
             disable=None,
         )
 
-    def __call__(self, progress: Progress) -> None:
-        """Show where the search is."""
-        done = min(int(100.0 * progress.share), 100)
+    def show(self, share: float, text: str) -> None:
+        """Show what share is done; a share that falls begins the bar anew."""
+        done = min(int(100.0 * share), 100)
         if done < self._bar.n:
             self._bar.reset()
         self._bar.n = done
-        self._bar.set_postfix_str(f"loss {progress.best_loss:.4g}, {progress.evaluations} evaluations", refresh=False)
+        self._bar.set_postfix_str(text, refresh=False)
         self._bar.update(0)
 
-    def __enter__(self) -> "SearchProgress":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._bar.close()
+
+
+class SearchProgress(_Bar):
+    """A bar over the parts of a search; used as its watcher.
+
+    A search that is made once more, with other weights, begins the bar anew.
+    """
+
+    def __init__(self, label: str = "identify") -> None:
+        super().__init__(label)
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the search is."""
+        self.show(progress.share, f"loss {progress.best_loss:.4g}, {progress.evaluations} evaluations")
+
+
+class StageProgress(_Bar):
+    """A bar over the stages of a task; used as its watcher."""
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Show which stage is at work."""
+        self.show(share, stage)

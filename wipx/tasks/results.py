@@ -48,6 +48,15 @@ def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def flat(settings: Mapping[str, object], prefix: str = "") -> dict[str, object]:
+    """Nested settings as one level, "optimizer.starts", so that runs compare."""
+    level: dict[str, object] = {}
+    for key, value in settings.items():
+        name = f"{prefix}{key}"
+        level |= flat(value, f"{name}.") if isinstance(value, Mapping) and value else {name: value}
+    return level
+
+
 def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}

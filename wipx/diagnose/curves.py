@@ -1,0 +1,100 @@
+"""The law of an effect as a curve over one signal, and the force that the recordings themselves ask for."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wipx.core.diagnosis import Curve
+from wipx.core.words import effect_in_words
+from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnose.leftover import Shape, leftovers
+from wipx.diagnose.stand_in import process_mean
+
+POINTS = 201
+OVER_RATE = (
+    "viscous",
+    "coulomb",
+    "stribeck",
+    "presliding",
+    "quadratic_drag",
+    "asymmetric_coulomb",
+    "lugre",
+    "back_emf",
+)
+OVER_COMMAND = ("gain", "dead_zone", "saturation", "offset")
+OVER_COORDINATE = ("spring", "ripple", "rail_tilt")
+
+
+def law_curve(fitter: Fitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
+    """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
+    plant = fitter.follower.log.plant
+    site, _, kind = effect.partition("/")
+    joint = site if site in plant.joints else plant.actuated[0]
+    signal = _abscissa(kind, plant.joints.index(joint), fitter)
+    shape = next(
+        (s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (plant.joints.index(joint), signal)), None
+    )
+    if shape is None:
+        return None
+    model = completed.hypothesis.model
+    at = np.unique(np.concatenate([np.linspace(shape.knots[0], shape.knots[-1], POINTS), [-1e-9, 1e-9]]))
+    law = _force(kind, model.effects[effect], at, _wheel(model.parameters), model.parameters)
+    left = leftovers(fitter, reduced, [shape])[0]
+    force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
+    return Curve(
+        effect_in_words(effect, plant.kind),
+        shape.signal,
+        plant.unit_of(shape.signal),
+        "N m" if plant.is_angular(joint) else "N",
+        at,
+        law,
+        shape.knots,
+        force,
+        spread,
+    )
+
+
+def _abscissa(kind: str, joint: int, fitter: Fitter) -> str | None:
+    plant = fitter.follower.log.plant
+    if kind in OVER_RATE:
+        return plant.rates[joint]
+    if kind in OVER_COORDINATE:
+        return plant.coordinates[joint]
+    if kind in OVER_COMMAND:
+        return plant.commands[0 if len(plant.commands) == 1 else joint]
+    return None
+
+
+def _wheel(parameters: Mapping[str, float]) -> float:
+    return parameters.get("wheel_radius", 1.0)
+
+
+def _force(kind: str, p: Mapping[str, float], at: np.ndarray, radius: float, body: Mapping[str, float]) -> np.ndarray:
+    """Force that an effect adds over its signal; the laws of contract section 3 in steady motion."""
+    sign = np.sign(at)
+    if kind == "viscous":
+        return -p["sigma"] * at
+    if kind == "back_emf":
+        return -p["k_e"] * at
+    if kind in ("coulomb", "presliding"):
+        return -p["F_c"] * sign
+    if kind in ("stribeck", "lugre"):
+        return -sign * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2)))
+    if kind == "quadratic_drag":
+        return -p["c"] * at * np.abs(at)
+    if kind == "asymmetric_coulomb":
+        return np.where(at > 0.0, -p["F_plus"], np.where(at < 0.0, p["F_minus"], 0.0))
+    if kind == "gain":
+        return (p["k"] - 1.0) * at
+    if kind == "dead_zone":
+        return -np.clip(at, -p["band"], p["band"])
+    if kind == "saturation":
+        return np.clip(at, -p["F_max"], p["F_max"]) - at
+    if kind == "offset":
+        return np.full_like(at, p["F_0"])
+    if kind == "spring":
+        return -p["k"] * (at - p["x0"])
+    if kind == "ripple":
+        return p["A"] * np.cos(p["n"] * at / radius + p["phase"])
+    weight = (body.get("body_mass", 0.0) + body.get("wheel_mass", 0.0)) * body["gravity"]
+    return np.full_like(at, -weight * np.sin(p["angle"]))

@@ -1,0 +1,422 @@
+"""The diagnosis: nominal model and recordings in, verdict, location, names, numbers and what is open out."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.diagnosis import Alternative, Bound, Diagnosis, FoundEffect, Unexplained, Verdict
+from wipx.core.model import Model
+from wipx.core.recording import Recording
+from wipx.core.results import Estimate
+from wipx.core.words import effect_in_words
+from wipx.diagnose.curves import law_curve
+from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnose.follower import Follower
+from wipx.diagnose.heldout import Transfer, judged, transfer
+from wipx.diagnose.hypothesis import Hypothesis, Setting
+from wipx.diagnose.leftover import Leftover, Shape, leftovers, shapes_of
+from wipx.diagnose.location import located
+from wipx.diagnose.log import Log
+from wipx.diagnose.nested import simpler
+from wipx.diagnose.observer import NoiseLevels
+from wipx.diagnose.robust import covariance, inflation
+from wipx.diagnose.screening import prospects
+from wipx.diagnose.selection import Selection
+from wipx.diagnose.stand_in import curve_of, with_curve
+from wipx.effects.catalogue import effect_of
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.identify.parameter_space import scales_of
+from wipx.identify.windows import check_long_enough
+from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+
+HORIZON = 0.5  # [s] of predictions, contract section 4
+ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
+NINETY_FIVE = 1.96  # standard deviations
+SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
+LEFTOVER_GAIN = 30.0  # nats that a leftover must be worth
+LEFTOVER_SHARE = 0.02  # and of what is explained
+IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+WIDE = 0.3  # relative half width of an interval from which a number is called weak
+
+Watcher = Callable[[str, float], None]
+
+
+def unwatched(stage: str, share: float) -> None:
+    """A watcher that looks away."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What a diagnosis knows of a robot beforehand.
+
+    Attributes:
+        nominal: What its owner believes.
+        uncertainty: Relative standard deviation of nominal numbers that are not exact.
+        feedback: The controller that closed the loop, and its rate [Hz]; None if unknown.
+    """
+
+    nominal: Model
+    uncertainty: Mapping[str, float]
+    feedback: tuple[StateFeedback, float] | None = None
+
+
+def diagnose(
+    recordings: tuple[Recording, ...],
+    robot: Robot,
+    simulator: AnalyticSimulator,
+    *,
+    title: str = "",
+    source: str = "",
+    lead: float = 0.3,
+    watcher: Watcher = unwatched,
+) -> Diagnosis:
+    """Find out what physics a nominal model lacks.
+
+    Args:
+        recordings: Of one robot; several with different excitations tell most.
+        robot: The nominal model.
+        simulator: The engine.
+        title: Of the page.
+        source: Where the recordings come from.
+        lead: Time before a prediction from which its state is estimated [s].
+        watcher: Told the stage and the share that is done.
+
+    Raises:
+        InputError: a recording is too short.
+    """
+    begun = time.perf_counter()
+    check_long_enough(recordings)
+    case = _Case.of(recordings, robot, simulator, lead)
+    watcher("noise of the nominal model", 0.02)
+    start = Hypothesis.of(case.setting, (), {})
+    nominal = case.fitter.polished(case.fitter.fit(start, case.first_levels))
+    selection = Selection(case.fitter, case.setting, nominal)
+    watcher("looking for missing effects", 0.1)
+    chosen = selection.run()
+    watcher("what is left over", 0.6)
+    chosen = case.without_irrelevant(selection, chosen)
+    shapes = shapes_of(case.fitter.follower)
+    rest = case.remaining(selection, chosen, shapes)
+    watcher("held-out recordings", 0.75)
+    answer = case.answer(selection, rest, shapes)
+    watcher("done", 1.0)
+    return replace(answer, title=title, source=source, seconds=time.perf_counter() - begun)
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """The final fit and what it leaves over."""
+
+    fit: Fit
+    strongest: Leftover | None
+    p_value: float
+    significant: bool
+    resembles: tuple[str, ...]
+    spread: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Everything that the stages of one diagnosis share."""
+
+    fitter: Fitter
+    setting: Setting
+    first_levels: NoiseLevels
+    judge: Judge
+    recordings: tuple[Recording, ...]
+
+    @classmethod
+    def of(cls, recordings: tuple[Recording, ...], robot: Robot, simulator: AnalyticSimulator, lead: float) -> "_Case":
+        plant = robot.nominal.plant
+        log = Log.of(recordings, plant)
+        noise = sensor_noise(recordings, plant)
+        rates = [_rate_noise(recordings, plant.rates[c - log.joints]) for c in log.channels if c >= log.joints]
+        levels = NoiseLevels(np.full(log.joints, 0.01), np.array([*noise, *rates]))
+        setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, recordings))
+        fitter = Fitter(Follower.of(simulator, log, robot.nominal))
+        return cls(fitter, setting, levels, Judge(simulator, noise, HORIZON, lead), recordings)
+
+    @property
+    def log(self) -> Log:
+        """The recordings."""
+        return self.fitter.follower.log
+
+    def without_irrelevant(self, selection: Selection, fit: Fit) -> Fit:
+        """Without effects that change no prediction to speak of."""
+        for effect in fit.effects:
+            rest = tuple(e for e in fit.effects if e != effect)
+            reduced = selection.fitted(rest, fit) if rest else selection.nominal
+            floor = self.judge.noise
+            with_it = self.judge.predict(fit.hypothesis.model, self.recordings)
+            without = self.judge.predict(reduced.hypothesis.model, self.recordings)
+            change = np.concatenate(with_it) - np.concatenate(without)
+            if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * floor):
+                return self.without_irrelevant(selection, reduced)
+        return fit
+
+    def remaining(self, selection: Selection, fit: Fit, shapes: list[Shape]) -> _Rest:
+        """What the named effects leave over, and a stand-in for it."""
+        found = leftovers(self.fitter, fit, shapes)
+        strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < SIGNIFICANT else 0.0)
+        p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
+        explained = fit.log_likelihood - selection.nominal.log_likelihood
+        worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained)
+        if p_value > SIGNIFICANT or strongest.gain < worth:
+            return _Rest(fit, None, p_value, False, (), np.zeros(0))
+        resembles, named = self._beyond(selection, fit, worth)
+        forces = [leftover for leftover in found if leftover.shape.kind != "resonance"]
+        widest = max(forces, key=lambda leftover: leftover.gain)
+        stood_in, spread = with_curve(self.fitter, self.setting, fit, widest)
+        if named is not None and named.log_likelihood > stood_in.log_likelihood:
+            return _Rest(named, strongest, p_value, True, resembles, np.zeros(0))
+        return _Rest(stood_in, widest, p_value, True, resembles, spread)
+
+    def _beyond(self, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
+        """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
+        ranked = prospects(self.fitter, self.setting, fit, beyond=True)
+        best: dict[str, Fit] = {}
+        for prospect in ranked:
+            if prospect.gain < 0.3 * ranked[0].gain or prospect.gain < 0.3 * worth or len(best) == 3:
+                break
+            if prospect.effect not in best:
+                values = {**fit.hypothesis.values, **prospect.values}
+                hypothesis = Hypothesis.of(self.setting, (*fit.effects, prospect.effect), values)
+                best[prospect.effect] = self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+        good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
+        ordered = sorted(good, key=lambda name: -selection.score(good[name]))
+        return tuple(ordered), good[ordered[0]] if ordered else None
+
+    def answer(self, selection: Selection, rest: _Rest, shapes: list[Shape]) -> Diagnosis:
+        """Everything a person wants to know."""
+        nominal, fit = self.setting.nominal, rest.fit
+        repeated = transfer(self.fitter, fit)
+        held_out, traces = judged(self.judge, nominal, repeated.models, self.recordings)
+        fitted, fit_traces = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
+        ends = self._estimates(fit)
+        effects = self._effects(selection, rest, repeated, ends, shapes)
+        verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
+        unexplained = self._unexplained(rest)
+        location = located(self.fitter, selection.nominal, fit, effects, unexplained.site)
+        draft = Diagnosis(
+            title="",
+            source="",
+            units=self._units(),
+            verdict=verdict,
+            sentence="",
+            nominal=nominal,
+            model=fit.hypothesis.model,
+            effects=effects,
+            corrected=tuple(e for e in ends if e.name in self.setting.uncertainty),
+            location=location,
+            fit=fitted,
+            held_out=held_out,
+            unexplained=unexplained,
+            candidates=tuple(selection.considered),
+            bounds=self._bounds(fit),
+            weak=self._weak(effects),
+            next_experiment=None,
+            traces=(*traces, *fit_traces) if len(self.recordings) == 1 else traces,
+            notes=(),
+            seconds=0.0,
+        )
+        return replace(draft, sentence=sentence(draft))
+
+    def _units(self) -> dict[str, str]:
+        plant = self.log.plant
+        return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
+
+    def _estimates(self, fit: Fit) -> tuple[Estimate, ...]:
+        """Every number of a fit with its 95 % interval."""
+        space, cube = fit.hypothesis.space, fit.hypothesis.cube
+        deviation = np.sqrt(np.diag(covariance(fit, self.log))) if len(cube) else np.zeros(0)
+        values = space.to_values(cube)
+        low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
+        high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
+        return tuple(
+            Estimate(
+                p.name,
+                p.unit,
+                p.neutral,
+                float(values[i]),
+                float(low[i]),
+                float(high[i]),
+                bool(cube[i] <= 0.0 or cube[i] >= 1.0),
+                _meaning(space.model, p.name),
+            )
+            for i, p in enumerate(space.free)
+        )
+
+    def _effects(
+        self,
+        selection: Selection,
+        rest: _Rest,
+        repeated: Transfer,
+        ends: tuple[Estimate, ...],
+        shapes: list[Shape],
+    ) -> tuple[FoundEffect, ...]:
+        fit = rest.fit
+        reduced = {effect: self._reduced(selection, fit, effect) for effect in fit.effects}
+        gains = {effect: max(fit.log_likelihood - reduced[effect].log_likelihood, 0.0) for effect in fit.effects}
+        total = sum(gains.values()) or 1.0
+        found = []
+        for effect in sorted(fit.effects, key=lambda e: -gains[e]):
+            law = effect_of(effect, self.log.plant)
+            rivals, probability = self._rivals(selection, fit, effect)
+            found.append(
+                FoundEffect(
+                    effect,
+                    law.law,
+                    law.source,
+                    law.beyond,
+                    tuple(e for e in ends if e.name.startswith(f"{effect}.")),
+                    tuple(rival.name for rival in rivals if rival.separation < ALIKE),
+                    rivals,
+                    gains[effect],
+                    self._heldout_gain(repeated, reduced[effect]),
+                    probability,
+                    gains[effect] / total,
+                    law_curve(self.fitter, reduced[effect], fit, effect, shapes),
+                )
+            )
+        return tuple(found)
+
+    def _reduced(self, selection: Selection, fit: Fit, effect: str) -> Fit:
+        """The fit without one effect, its stand-in kept."""
+        rest = tuple(e for e in fit.effects if e != effect)
+        if fit.hypothesis.space.model.effects.keys() <= {*self.setting.nominal.effects, *fit.effects}:
+            return selection.fitted(rest, fit) if rest else selection.nominal
+        extra = {
+            name: fit.hypothesis.space.model.effects[name]
+            for name in fit.hypothesis.space.model.effects
+            if name not in fit.effects and name not in self.setting.nominal.effects
+        }
+        richer = Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
+        hypothesis = Hypothesis.of(richer, rest, fit.hypothesis.values)
+        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+
+    def _heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
+        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
+        columns = self.log.plant.coordinates
+        with_it = [self.judge.predict(m, (r,))[0] for m, r in zip(repeated.models, self.recordings, strict=True)]
+        without = self.judge.predict(reduced.hypothesis.model, self.recordings)
+        after = before = 0.0
+        for recording, now, then in zip(self.recordings, with_it, without, strict=True):
+            recorded = recording.stack(columns)
+            after += float(np.nansum(((now - recorded) / self.judge.noise) ** 2))
+            before += float(np.nansum(((then - recorded) / self.judge.noise) ** 2))
+        return 1.0 - after / before if before > 0.0 else 0.0
+
+    def _rivals(self, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
+        """Effects that could stand in the place of one, the closest first, and the probability of its name."""
+        overstated = inflation(fit, self.log, fit.hypothesis.parameters_of(effect))
+        rivals, weights = [], []
+        rest = set(fit.effects) - {effect}
+        for other in selection.replacements(fit, effect):
+            name = next(iter(set(other.effects) - rest), effect)
+            if name == effect or _is_richer(other, effect, self.log):
+                continue
+            loss = fit.log_likelihood - other.log_likelihood
+            values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
+            rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
+            weights.append(np.exp(min(selection.score(other) - selection.score(fit), 0.0) / overstated))
+        rivals.sort(key=lambda rival: rival.separation)
+        return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
+
+    def _unexplained(self, rest: _Rest) -> Unexplained:
+        if not rest.significant or rest.strongest is None:
+            return Unexplained(False, rest.p_value, None, "", (), None)
+        shape = rest.strongest.shape
+        site = self.log.plant.joints[shape.joint]
+        words = {
+            "force": f"a force over {shape.signal} on {site}",
+            "gain": "an actuator gain that drifts over time",
+            "resonance": f"something that swings with {site} at about {shape.signal} Hz",
+        }[shape.kind]
+        curve = curve_of(shape, rest.fit, rest.spread, self.log) if len(rest.spread) else None
+        return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
+
+    def _bounds(self, fit: Fit) -> tuple[Bound, ...]:
+        """How large effects that were not found could be: from the sharpest look at each."""
+        sharpest: dict[str, tuple[float, Bound]] = {}
+        for prospect in prospects(self.fitter, self.setting, fit):
+            first, value = next(iter(prospect.values.items()))
+            if not np.isfinite(prospect.deviation):
+                continue
+            spec = effect_of(prospect.effect, self.log.plant).parameters[0]
+            unit = spec.unit(angular=self.log.plant.is_angular(prospect.effect.partition("/")[0]))
+            reach = NINETY_FIVE * prospect.deviation
+            low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
+            known = sharpest.get(prospect.effect)
+            if known is None or prospect.deviation < known[0]:
+                sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, value + reach, unit))
+        return tuple(bound for _, bound in sharpest.values())
+
+    def _weak(self, effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
+        found = []
+        for effect in effects:
+            for p in effect.parameters:
+                size = max(abs(p.value - p.nominal) if effect.law and p.nominal == p.nominal else 0.0, 1e-300)
+                if 0.5 * (p.high - p.low) > WIDE * max(size, abs(p.value)):
+                    found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
+            for name in effect.equivalent:
+                found.append(f"{effect.name} cannot be told from {name}")
+        return tuple(found)
+
+
+def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
+    """Standard deviation of a recorded rate's noise, by second differences."""
+    values = np.concatenate([np.diff(r[column], 2) for r in recordings])
+    return max(1.4826 * float(np.median(np.abs(values))) / np.sqrt(6.0), 1e-9)
+
+
+def _is_richer(other: Fit, effect: str, log: Log) -> bool:
+    """Whether a rival is the same law with more to it that is not needed."""
+    replaced = simpler(other, log)
+    return replaced is not None and effect in replaced
+
+
+def _meaning(model: Model, name: str) -> str:
+    effect, _, symbol = name.rpartition(".")
+    if not effect:
+        return model.plant.parameters[symbol].meaning
+    return next(p.meaning for p in effect_of(effect, model.plant).parameters if p.name == symbol)
+
+
+def sentence(diagnosis: Diagnosis) -> str:
+    """The answer in one sentence or two."""
+    kind = diagnosis.nominal.plant.kind
+    share = explained_share(diagnosis)
+    parts = [_with_size(effect, kind) for effect in diagnosis.effects]
+    listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
+    verb = "was" if len(parts) == 1 else "were"
+    named = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {'it' if len(parts) == 1 else 'them'} explains"
+    if diagnosis.verdict == "consistent":
+        return "The nominal model explains the recordings up to noise: nothing is missing."
+    if diagnosis.verdict == "mismatch":
+        return f"{named} {share:.0%} of the mismatch."
+    rest = f"{diagnosis.unexplained.shape[:1].upper()}{diagnosis.unexplained.shape[1:]} that no effect of the vocabulary explains"
+    return f"{rest} is left over." if not parts else f"{named} a part of the mismatch. {rest} is left over."
+
+
+def explained_share(diagnosis: Diagnosis) -> float:
+    """Share of the explainable squared prediction error on held-out recordings that the completed model removes."""
+    errors = diagnosis.held_out
+    removed = total = 0.0
+    for name, floor in errors.noise_floor.items():
+        scale = max(floor, 1e-12) ** 2
+        total += max(errors.nominal[name] ** 2 - floor**2, 0.0) / scale
+        removed += max(errors.nominal[name] ** 2 - max(errors.completed[name] ** 2, floor**2), 0.0) / scale
+    return removed / total if total > 0.0 else 0.0
+
+
+def _with_size(effect: FoundEffect, kind: str) -> str:
+    """An effect in words with its first number."""
+    words = effect_in_words(effect.name, kind)
+    if not effect.parameters:
+        return words
+    first = effect.parameters[0]
+    unit = "" if first.unit == "1" else f" {first.unit}"
+    return f"{words} ({first.name.rpartition('.')[2]} = {first.value:.3g}{unit})"

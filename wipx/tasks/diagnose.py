@@ -1,0 +1,85 @@
+"""`task=diagnose`: say what physics a nominal model lacks, and leave the completed model."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from wipx.core.diagnosis import Diagnosis
+from wipx.core.errors import check_positive
+from wipx.diagnose.diagnosis import Robot, diagnose
+from wipx.recordings.model_file import write_model
+from wipx.recordings.source import RecordingSource
+from wipx.report.diagnosis_json import diagnosis_json
+from wipx.report.diagnosis_summary import summary
+from wipx.tasks.identify import feedback_of
+from wipx.tasks.job import Job
+from wipx.tasks.progress import StageProgress
+from wipx.tasks.results import flat, write_csv, write_json, written_together
+
+
+@dataclass(frozen=True)
+class Diagnose:
+    """Diagnose the recordings of a source.
+
+    Attributes:
+        lead: Time before a prediction from which its state is estimated [s].
+    """
+
+    lead: float = 0.3
+
+    def __post_init__(self) -> None:
+        check_positive(lead=self.lead)
+
+    def run(self, job: Job) -> None:
+        """Read, diagnose, write."""
+        self.of(job, job.part("recordings"))
+
+    def of(self, job: Job, source: RecordingSource) -> Diagnosis:
+        """Diagnose the recordings of a source and leave the results in the job's folder."""
+        description = source.describe()
+        recordings = source.load()
+        robot = Robot(job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description))
+        with StageProgress("diagnose") as progress:
+            diagnosis = diagnose(
+                recordings,
+                robot,
+                job.part("sim"),
+                title=source.name,
+                source=str(source.path),
+                lead=self.lead,
+                watcher=progress,
+            )
+        with written_together(job.out) as folder:
+            write_diagnosis(diagnosis, folder)
+        _track(job, diagnosis)
+        print(summary(diagnosis))
+        print(f"\npage: {job.out / 'report.html'}")
+        return diagnosis
+
+
+def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
+    """Write diagnosis.json, model.yaml, report.html, diagnosis.png and, where there is one, next_experiment.csv."""
+    from wipx.report.diagnosis_figure import draw_diagnosis
+    from wipx.report.diagnosis_page import write_diagnosis_page
+
+    write_json(folder / "diagnosis.json", diagnosis_json(diagnosis))
+    write_model(diagnosis.model, folder / "model.yaml")
+    write_diagnosis_page(diagnosis, folder / "report.html")
+    draw_diagnosis(diagnosis, folder / "diagnosis.png")
+    if diagnosis.next_experiment is not None and diagnosis.next_experiment.reference:
+        write_csv(folder / "next_experiment.csv", diagnosis.next_experiment.reference)
+
+
+def _track(job: Job, diagnosis: Diagnosis) -> None:
+    errors = {"fit": diagnosis.fit, "heldout": diagnosis.held_out}
+    figures = {
+        f"{part}/{model}/{column}": value
+        for part, e in errors.items()
+        for model in ("nominal", "completed", "noise_floor")
+        for column, value in getattr(e, model).items()
+    }
+    figures |= {f"parameter/{p.name}": p.value for effect in diagnosis.effects for p in effect.parameters}
+    figures |= {f"evidence/{effect.name}": effect.log_evidence_gain for effect in diagnosis.effects}
+    figures["seconds"] = diagnosis.seconds
+    names = ("diagnosis.json", "model.yaml", "report.html", "diagnosis.png")
+    tags = {"plant": diagnosis.nominal.plant.kind, "source": diagnosis.source, "verdict": diagnosis.verdict}
+    job.part("tracking").log(diagnosis.title, flat(job.settings), figures, {}, [job.out / name for name in names], tags)
