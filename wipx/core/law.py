@@ -34,10 +34,10 @@ def clip(value, low, high):
 
 @law
 def above(excess, spread):
-    """Mean of what is above zero of numbers spread evenly by +-`spread` about `excess`."""
+    """Mean of what is above zero of numbers about `excess`, triangularly distributed over +-`spread`."""
     width = maximum(spread, 1e-12)
-    inside = clip(excess, -width, width) + width
-    return inside * inside / (4.0 * width) + maximum(excess - width, 0.0)
+    tail = maximum(width - abs(excess), 0.0)
+    return maximum(excess, 0.0) + tail * tail * tail / (6.0 * width * width)
 
 
 @law

@@ -151,8 +151,9 @@ class _Asked:
             return []
         hypothesis = view.judge.hypothesis
         slopes = view.slopes(hypothesis, hypothesis.cube, self.fit.information)
-        total = np.linalg.pinv(self.known) + slopes.T @ slopes / self.overstated
-        before, after = (np.sqrt(np.diag(c)) for c in (self.known, np.linalg.pinv(total)))
+        known = np.linalg.pinv(self.known) + np.eye(len(hypothesis.cube))  # each is known to lie in the cube
+        total = known + slopes.T @ slopes / self.overstated
+        before, after = (np.sqrt(np.diag(np.linalg.inv(information))) for information in (known, total))
         found = []
         for i in self.numbers:
             value, per_cube = _value_and_slope(hypothesis, i)
@@ -174,7 +175,10 @@ class _View:
     judge: Fit
 
     def distance(self, rival: Hypothesis, information: np.ndarray) -> float:
-        """Twice the expected log-likelihood ratio when the rival is fitted to run and recordings [nats]."""
+        """Twice the log-likelihood ratio to expect when the rival is fitted to run and recordings [nats].
+
+        The size of the noise is fitted as well, so that the ratio grows with the logarithm of a large difference.
+        """
         truth = self._white(self.judge.hypothesis, self.judge.hypothesis.cube[None])[0]
         start = rival.cube
         cost = float(np.sum((self._white(rival, start[None])[0] - truth) ** 2))
@@ -191,7 +195,9 @@ class _View:
             if costs[best] >= cost:
                 break
             cube, cost = trials[best], float(costs[best])
-        return cost
+        log = self.fitter.follower.log
+        values = int(log.counted.sum()) * len(log.channels)
+        return values * float(np.log1p(cost / values))
 
     def slopes(self, hypothesis: Hypothesis, cube: np.ndarray, information: np.ndarray) -> np.ndarray:
         """Slopes of the white innovations by the position in the cube, shape (values, D)."""

@@ -12,9 +12,8 @@ import numpy as np
 from wipx.core.model import ModelBatch
 from wipx.diagnose.follower import Follower
 from wipx.diagnose.hypothesis import Hypothesis
-from wipx.diagnose.observer import NoiseLevels
+from wipx.diagnose.observer import Gains, NoiseLevels
 from wipx.diagnose.whiteness import Colour, colour_of, whitened
-from wipx.identify.parameter_space import ParameterSpace
 
 FIRST_STEP = 1e-4  # of the search interval, for the first slopes
 LARGEST_STEP = 0.02
@@ -23,6 +22,8 @@ DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
 LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
+LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
+THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
 POLISHED = 0.5  # nats at which alternating ends
 
 
@@ -101,31 +102,42 @@ class Fitter:
     def levels_of(self, fit: Fit) -> NoiseLevels:
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
-        Their common factor does not matter: the last sensor's level is kept.
+        The levels' common factor does not matter: the first sensor's level is kept. Where the log has means of
+        commands and the model a threshold for them, the spread of the single commands is searched too.
         """
-        joints = len(fit.levels.force)
-        best = np.log(np.concatenate([fit.levels.force, fit.levels.sensor]))
+        fixed = len(fit.levels.force)
+        levels = self._with_spread(fit)
+        best = _logarithms(levels)
+        free = [i for i in range(len(best) - (levels.spread == 0.0)) if i != fixed]
         centre = best.copy()
-        likelihood = self._likelihoods(fit.hypothesis, [_levels(best, joints)])[0]
+        likelihood = self._likelihoods(fit.hypothesis, [levels])[0]
         for step in LEVEL_STEPS:
             move = np.zeros_like(best)
             for _ in range(12):
-                trials = [best + sign * step * axis for axis in np.eye(len(best))[:-1] for sign in (-1.0, 1.0)]
+                trials = [best + sign * step * np.eye(len(best))[i] for i in free for sign in (-1.0, 1.0)]
                 if np.count_nonzero(move) > 1:
                     trials.append(best + move)
                 trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
-                found = np.array(self._likelihoods(fit.hypothesis, [_levels(trial, joints) for trial in trials]))
-                gains = found[: 2 * (len(best) - 1)] - likelihood
-                move = _joined(gains, step, len(best))
-                if found.max() <= likelihood + 0.1 * SETTLED:
+                found = np.array(self._likelihoods(fit.hypothesis, [_levels(trial, levels) for trial in trials]))
+                move = _joined(found[: 2 * len(free)] - likelihood, step, free, len(best))
+                if found.max() <= likelihood + LEVEL_GAIN:
                     break
                 best, likelihood = trials[int(found.argmax())], float(found.max())
-        return _levels(best, joints)
+        return _levels(best, levels)
+
+    def _with_spread(self, fit: Fit) -> NoiseLevels:
+        """The levels of a fit, with a first guess of the spread where it matters."""
+        log = self.follower.log
+        kinds = {name.partition("/")[2] for name in fit.hypothesis.model.effects}
+        averaged = any(recording.periods > 1 for recording in log.recordings)
+        if not averaged or kinds.isdisjoint(THRESHOLDS):
+            return replace(fit.levels, spread=0.0)
+        return fit.levels if fit.levels.spread > 0.0 else replace(fit.levels, spread=log.command_noise)
 
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
         """White innovations of other models, with observer and colour of a fit, shape (P, R m (K + 1))."""
         gains = self.follower.gains(fit.levels, fit.hypothesis.model)
-        innovations = self.follower.innovations(batch, (gains,), np.zeros(batch.size, dtype=np.int64))
+        innovations = self._followed(batch, gains, fit.levels)
         return whitened(innovations, fit.colour, self.follower.log).reshape(batch.size, -1)
 
     def _evaluate(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
@@ -144,8 +156,11 @@ class Fitter:
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
         gains = self.follower.gains(levels, hypothesis.model)
-        batch = hypothesis.space.batch(cubes)
-        return self.follower.innovations(batch, (gains,), np.zeros(len(cubes), dtype=np.int64))
+        return self._followed(hypothesis.space.batch(cubes), gains, levels)
+
+    def _followed(self, batch: ModelBatch, gains: Gains, levels: NoiseLevels) -> np.ndarray:
+        same = np.zeros(batch.size, dtype=np.int64)
+        return self.follower.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
 
     def _slopes(self, fit: Fit, size: np.ndarray) -> np.ndarray:
         """Slopes of white innovations and priors, by differences away from the nearer bound."""
@@ -191,7 +206,8 @@ class Fitter:
         gains = tuple(self.follower.gains(level, hypothesis.model) for level in levels)
         count = len(levels)
         batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
-        innovations = self.follower.innovations(batch, gains, np.arange(count))
+        spread = np.array([level.spread for level in levels])
+        innovations = self.follower.innovations(batch, gains, np.arange(count), spread)
         priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
         return [
             _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
@@ -199,18 +215,23 @@ class Fitter:
         ]
 
 
-def _levels(logarithms: np.ndarray, joints: int) -> NoiseLevels:
+def _logarithms(levels: NoiseLevels) -> np.ndarray:
+    return np.log(np.concatenate([levels.force, levels.sensor, [max(levels.spread, 1e-300)]]))
+
+
+def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
     values = np.exp(logarithms)
-    return NoiseLevels(values[:joints], values[joints:])
+    joints = len(like.force)
+    return NoiseLevels(values[:joints], values[joints:-1], float(values[-1]) if like.spread > 0.0 else 0.0)
 
 
-def _joined(gains: np.ndarray, step: float, count: int) -> np.ndarray:
-    """All single moves that gained, made at once; gains in pairs (-, +) for each level but the last."""
+def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.ndarray:
+    """All single moves that gained, made at once; gains in pairs (-, +) for each free level."""
     move = np.zeros(count)
-    for i in range(count - 1):
+    for i, index in enumerate(free):
         down, up = gains[2 * i], gains[2 * i + 1]
         if max(down, up) > 0.0:
-            move[i] = step if up > down else -step
+            move[index] = step if up > down else -step
     return move
 
 

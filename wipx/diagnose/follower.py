@@ -49,19 +49,22 @@ class Follower:
             self._known[key] = observer_gains(self.linear, self.log, levels, delays)
         return self._known[key]
 
-    def innovations(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray) -> np.ndarray:
+    def innovations(
+        self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray
+    ) -> np.ndarray:
         """Innovations in standard deviations of the observer, shape (P, R, m, K + 1).
 
         Args:
             batch: P models.
             gains: Of one or more observers.
             group: Which of them each model has, shape (P,).
+            spread: Half width of the single commands, shape (P,) [N or N m].
         """
         log = self.log
         start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
-        shown = self.simulator.follow(batch, log.inputs, start, Observer(log.measured, corrections, group))
+        shown = self.simulator.follow(batch, log.inputs, start, Observer(log.measured, corrections, group, spread))
         return _innovations(
             log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last
         )

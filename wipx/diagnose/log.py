@@ -68,3 +68,9 @@ class Log:
     def intervals(self) -> np.ndarray:
         """Time from each row to the next, shape (K, R) [s]; zero in the padding."""
         return np.where(self.rows[1:], np.diff(self.inputs.t, axis=0), 0.0)
+
+    @property
+    def command_noise(self) -> float:
+        """Standard deviation of what is noise in the commands from row to row [N or N m]."""
+        fourth = [np.diff(r[name], 4) for r in self.recordings for name in self.plant.commands]
+        return max(1.4826 * float(np.median(np.abs(np.concatenate(fourth)))) / np.sqrt(70.0), 1e-9)

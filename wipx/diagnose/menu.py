@@ -144,15 +144,7 @@ def _references(model: Model, reach: Reach, phases: np.ndarray) -> tuple[Excitat
         Excitation("tracking", _sine(TRACKING), tracked, f"a sine of {{size}} {{unit}} at {TRACKING:g} Hz"),
         multisine,
         gentle,
-        Excitation(
-            "steps to saturation",
-            _square,
-            0.2 * span,
-            steps,
-            jumps=True,
-            command=SATURATING * reach.command,
-            shrinks=False,
-        ),
+        replace(gentle, name="steps to saturation", command=SATURATING * reach.command, shrinks=False),
         Excitation("chirp", _chirp, 0.5 * wide, _sweep()),
     ]
     mass = ADDED_MASS * model.parameters.get("body_mass", 0.0)

@@ -29,6 +29,7 @@ ROUNDS = 3  # of noise levels and values in turn
 OVERWHELMING = 0.05  # nats for every recorded value: errors from row to row 5 % smaller throughout
 QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins [s^0.5]
 GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
+LEAST_MOTION = 0.005  # [m, rad] that a recorded robot travels
 ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
 
 
@@ -64,6 +65,15 @@ class Slip:
         names = (*log.plant.coordinates, *log.plant.rates)
         return np.array([abs(self.columns.get(names[c], (1.0, 0.0))[0]) for c in log.channels])
 
+    def leaves_motion(self, log: Log) -> bool:
+        """Whether the coordinates still move noticeably once it is put right; a unit that is right is no slip."""
+        for column, (factor, _) in self.columns.items():
+            if column in log.plant.coordinates:
+                travel = max(float(np.ptp(r[column])) for r in log.recordings)
+                if abs(factor) * travel < LEAST_MOTION:
+                    return False
+        return True
+
 
 def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
     """Refuse a robot.yaml that the recordings contradict grossly.
@@ -82,7 +92,8 @@ def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, w
     """
     log = fitter.follower.log
     probe = _Case.of(fitter.follower.simulator, _probed(log.recordings), setting, nominal.levels)
-    mended = [(probe.without(slip), slip) for slip in slips(setting.nominal)]
+    possible = [slip for slip in slips(setting.nominal) if slip.leaves_motion(log)]
+    mended = [(probe.without(slip), slip) for slip in possible]
     case, slip = max(mended, key=lambda pair: pair[0].nominal_likelihood)
     if case.nominal_likelihood <= probe.nominal_likelihood:
         return
@@ -91,7 +102,7 @@ def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, w
     if gain > OVERWHELMING:
         raise InputError(
             f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from "
-            f"row to row are {-np.expm1(-gain):.0%} smaller than any missing effect makes them); {slip.remedy}"
+            f"row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {slip.remedy}"
         )
 
 

@@ -122,7 +122,7 @@ class Selection:
 
     def pruned(self, fit: Fit) -> Fit:
         """Without the effects that the latest one made superfluous."""
-        for effect in fit.effects[:-1]:
+        for effect in fit.effects if len(fit.effects) > 1 else ():
             rest = tuple(e for e in fit.effects if e != effect)
             smaller = self.fitted(rest, fit)
             if not self.worthwhile(smaller, fit):
@@ -142,7 +142,8 @@ class Selection:
                 found = self.preferred(self.replacements(fit, effect))
                 if found is not None and self.score(found) > self.score(best) + 2.0:
                     best = found
-            if best is fit:
+            best = self.pruned(best)
+            if best.effects == fit.effects:
                 break
             fit = best
         return fit

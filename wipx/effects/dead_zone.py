@@ -16,5 +16,5 @@ EFFECT = Effect(
 
 @law
 def force(u, band, spread):
-    """Mean force of commands that are spread evenly by +-`spread` about `u`; spread 0 is the plain law."""
+    """Mean force of commands scattered by up to `spread` about `u`; spread 0 is the plain law."""
     return above(u - band, spread) - above(-u - band, spread)

@@ -17,5 +17,5 @@ EFFECT = Effect(
 
 @law
 def force(u, limit, spread):
-    """Mean force of commands that are spread evenly by +-`spread` about `u`; spread 0 is the plain law."""
+    """Mean force of commands scattered by up to `spread` about `u`; spread 0 is the plain law."""
     return u - above(u - limit, spread) + above(-u - limit, spread)

@@ -1,7 +1,7 @@
 """Torque-speed limit: the driving force falls to zero at the motor's free speed."""
 
 from wipx.core.effect import Effect
-from wipx.core.law import clip, law, maximum
+from wipx.core.law import above, law, maximum
 from wipx.core.parameters import Parameter
 
 EFFECT = Effect(
@@ -26,8 +26,9 @@ EFFECT = Effect(
 
 
 @law
-def limited(force, v, stall, free):
-    """The `force` that the motor can give at joint velocity `v` [N or N m]."""
+def limited(force, v, stall, free, spread):
+    """Mean of what the motor can give of forces scattered by up to `spread`, at joint velocity `v` [N or N m]."""
     driving = stall * maximum(1.0 - abs(v) / free, 0.0)
-    limit = driving if force * v > 0.0 else stall
-    return clip(force, -limit, limit)
+    high = driving if v > 0.0 else stall
+    low = stall if v > 0.0 else driving
+    return force - above(force - high, spread) + above(-force - low, spread)

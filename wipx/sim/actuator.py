@@ -71,7 +71,9 @@ def actuator_path(S, on, j):
             S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[R.SPREAD * W + w])
     if on[R.ON_SPEED_LIMIT]:
         for w in range(W):
-            S[u + w] = speed_limit.limited(S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w])
+            S[u + w] = speed_limit.limited(
+                S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w], S[R.SPREAD * W + w]
+            )
     if on[R.ON_BACK_EMF]:
         for w in range(W):
             S[u + w] -= S[R.BACK_EMF * W + w] * S[v + w]

@@ -67,11 +67,14 @@ class Observer:
         gains: Shape (groups, K + 1, R, 2 joints, 2 joints), from channels to states; zero where nothing
             was measured.
         group: Which of the gains each model has, shape (P,).
+        spread: Half width by which single commands scatter about the mean that the log has, shape (P,)
+            [N or N m]; thresholds of the actuator answer to single commands.
     """
 
     recorded: np.ndarray
     gains: np.ndarray
     group: np.ndarray
+    spread: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -227,9 +230,7 @@ class _Run:
             ramps[:, [joint_index(site) for site in self.plant.actuated]] = self.inputs.ramps
             self.coefficients.present[R.ON_RAMP] = True
 
-        spread = np.zeros(self.inputs.windows)
-        if not per_lane and self.inputs.spread is not None:
-            spread = self.inputs.spread
+        spread = np.zeros(self.batch.size) if observer is None else observer.spread
 
         def work(begin: int, end: int) -> None:
             rollout(

@@ -19,8 +19,6 @@ class Inputs:
         last: Last row of each window, shape (R,).
         ramps: By how much the command changes along each row about its mean, shape (K, inputs, R); None
             where commands are held.
-        spread: Half width by which single commands scatter about their mean in each window, shape (R,); None
-            for not at all.
     """
 
     t: np.ndarray
@@ -28,7 +26,6 @@ class Inputs:
     first: np.ndarray
     last: np.ndarray
     ramps: np.ndarray | None = None
-    spread: np.ndarray | None = None
 
     @classmethod
     def of(
@@ -90,9 +87,7 @@ class Inputs:
         """The same windows cut after row `last` (R,) each."""
         rows = int(last.max()) + 1
         ramps = None if self.ramps is None else self.ramps[: rows - 1]
-        return Inputs(
-            self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last), ramps, self.spread
-        )
+        return Inputs(self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last), ramps)
 
 
 def _ramps(t: np.ndarray, commands: np.ndarray, periods: int) -> np.ndarray:
