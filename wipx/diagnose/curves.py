@@ -1,6 +1,6 @@
 """The law of an effect as a curve over one signal, and the force that the recordings themselves ask for."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -71,30 +71,22 @@ def _wheel(parameters: Mapping[str, float]) -> float:
 
 def _force(kind: str, p: Mapping[str, float], at: np.ndarray, radius: float, body: Mapping[str, float]) -> np.ndarray:
     """Force that an effect adds over its signal; the laws of contract section 3 in steady motion."""
-    sign = np.sign(at)
-    if kind == "viscous":
-        return -p["sigma"] * at
-    if kind == "back_emf":
-        return -p["k_e"] * at
-    if kind in ("coulomb", "presliding"):
-        return -p["F_c"] * sign
-    if kind in ("stribeck", "lugre"):
-        return -sign * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2)))
-    if kind == "quadratic_drag":
-        return -p["c"] * at * np.abs(at)
-    if kind == "asymmetric_coulomb":
-        return np.where(at > 0.0, -p["F_plus"], np.where(at < 0.0, p["F_minus"], 0.0))
-    if kind == "gain":
-        return (p["k"] - 1.0) * at
-    if kind == "dead_zone":
-        return -np.clip(at, -p["band"], p["band"])
-    if kind == "saturation":
-        return np.clip(at, -p["F_max"], p["F_max"]) - at
-    if kind == "offset":
-        return np.full_like(at, p["F_0"])
-    if kind == "spring":
-        return -p["k"] * (at - p["x0"])
-    if kind == "ripple":
-        return p["A"] * np.cos(p["n"] * at / radius + p["phase"])
     weight = (body.get("body_mass", 0.0) + body.get("wheel_mass", 0.0)) * body["gravity"]
-    return np.full_like(at, -weight * np.sin(p["angle"]))
+    laws: dict[str, Callable[[], np.ndarray]] = {
+        "viscous": lambda: -p["sigma"] * at,
+        "back_emf": lambda: -p["k_e"] * at,
+        "coulomb": lambda: -p["F_c"] * np.sign(at),
+        "presliding": lambda: -p["F_c"] * np.sign(at),
+        "stribeck": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
+        "lugre": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
+        "quadratic_drag": lambda: -p["c"] * at * np.abs(at),
+        "asymmetric_coulomb": lambda: np.where(at > 0.0, -p["F_plus"], np.where(at < 0.0, p["F_minus"], 0.0)),
+        "gain": lambda: (p["k"] - 1.0) * at,
+        "dead_zone": lambda: -np.clip(at, -p["band"], p["band"]),
+        "saturation": lambda: np.clip(at, -p["F_max"], p["F_max"]) - at,
+        "offset": lambda: np.full_like(at, p["F_0"]),
+        "spring": lambda: -p["k"] * (at - p["x0"]),
+        "ripple": lambda: p["A"] * np.cos(p["n"] * at / radius + p["phase"]),
+        "rail_tilt": lambda: np.full_like(at, -weight * np.sin(p["angle"])),
+    }
+    return laws[kind]()

@@ -215,7 +215,7 @@ class _Case:
             held_out=held_out,
             unexplained=unexplained,
             candidates=tuple(selection.considered),
-            bounds=self._bounds(fit),
+            bounds=self._bounds(selection, fit),
             weak=self._weak(effects),
             next_experiment=None,
             traces=(*traces, *fit_traces) if len(self.recordings) == 1 else traces,
@@ -338,10 +338,10 @@ class _Case:
         curve = curve_of(shape, rest.fit, rest.spread, self.log) if len(rest.spread) else None
         return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
 
-    def _bounds(self, fit: Fit) -> tuple[Bound, ...]:
+    def _bounds(self, selection: Selection, fit: Fit) -> tuple[Bound, ...]:
         """How large effects that were not found could be: from the sharpest look at each."""
         sharpest: dict[str, tuple[float, Bound]] = {}
-        for prospect in prospects(self.fitter, self.setting, fit):
+        for prospect in selection.prospects_of(fit):
             first, value = next(iter(prospect.values.items()))
             if not np.isfinite(prospect.deviation):
                 continue
@@ -397,7 +397,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         return "The nominal model explains the recordings up to noise: nothing is missing."
     if diagnosis.verdict == "mismatch":
         return f"{named} {share:.0%} of the mismatch."
-    rest = f"{diagnosis.unexplained.shape[:1].upper()}{diagnosis.unexplained.shape[1:]} that no effect of the vocabulary explains"
+    shape = diagnosis.unexplained.shape
+    rest = f"{shape[:1].upper()}{shape[1:]} that no effect of the vocabulary explains"
     return f"{rest} is left over." if not parts else f"{named} a part of the mismatch. {rest} is left over."
 
 

@@ -154,35 +154,25 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
     joints = a.shape[1]
     n, m = 2 * joints, len(channels)
     out = np.zeros((columns, recordings, m, rows))
-    transition = np.zeros((n, n))
-    state, moved = np.zeros(n), np.zeros(n)
-    states = np.zeros((columns, n))
+    transition, push = np.zeros((n, n)), np.zeros(n)
+    correction, show = np.eye(n), np.zeros((m, n))
     for r in range(recordings):
-        states[:] = 0.0
+        states = np.zeros((n, columns))
         for k in range(last[r] + 1):
-            inside = k < last[r]
-            if inside:
-                dt, g = intervals[k, r], place[k, r]
-                transition_over(a[g], dt, transition)
-            for c in range(columns):
-                state[:] = states[c]
-                for d in range(m):
-                    total = 0.0
-                    for e in range(d + 1):
-                        total -= whitening[k, r, d, e] * state[channels[e]]
-                    out[c, r, d, k] = total
-                if not inside:
-                    continue
-                for i in range(n):
-                    moved[i] = state[i]
-                    for d in range(m):
-                        moved[i] -= gains[k, r, i, channels[d]] * state[channels[d]]
-                force = forces[c, k, r]
-                for i in range(n):
-                    total = b[g, i % joints] * force * (0.5 * dt * dt if i < joints else dt)
-                    for l in range(n):
-                        total += transition[i, l] * moved[l]
-                    states[c, i] = total
+            for c in range(m):
+                show[:, channels[c]] = -whitening[k, r, :, c]
+                correction[:, channels[c]] = -gains[k, r, :, channels[c]]
+                correction[channels[c], channels[c]] += 1.0
+            shown = show @ states
+            for d in range(m):
+                out[:, r, d, k] = shown[d]
+            if k == last[r]:
+                break
+            dt, g = intervals[k, r], place[k, r]
+            transition_over(a[g], dt, transition)
+            for i in range(joints):
+                push[i], push[joints + i] = 0.5 * dt * dt * b[g, i], dt * b[g, i]
+            states = (transition @ correction) @ states + np.outer(push, forces[:, k, r])
     return out
 
 

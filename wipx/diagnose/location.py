@@ -128,13 +128,14 @@ def _map(log: Log, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> Err
     names = _axes(plant)
     counted = log.counted
     values = [signals[name][counted] for name in names]
-    edges = [np.linspace(*np.quantile(v, (0.002, 0.998)), BINS + 1) for v in values]
+    ends = [np.quantile(v, (0.002, 0.998)) for v in values]
+    edges = [np.linspace(low, high, BINS + 1) for low, high in ends]
     sums = np.histogram2d(*values, bins=edges, weights=excess[counted])[0]
     counts = np.histogram2d(*values, bins=edges)[0]
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(counts > 0, sums / counts, np.nan)
     times, along = [], []
-    for r, recording in enumerate(log.recordings):
+    for r in range(len(log.recordings)):
         t = log.inputs.t[counted[:, r], r]
         bounds = np.linspace(t[0], t[-1] + 1e-9, RUN_BINS + 1)
         total = np.histogram(t, bounds, weights=excess[counted[:, r], r])[0]

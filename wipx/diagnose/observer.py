@@ -8,7 +8,6 @@ taken from it; the state itself follows the nonlinear model.
 
 from dataclasses import dataclass
 
-
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
@@ -21,6 +20,8 @@ STEP = 1e-5  # [s] of the simulated steps from which accelerations are read off
 REACH = 1e-4  # of the differences [m, rad, m/s, rad/s]
 PROBE = 1e-3  # damping by which the answer to a force is found [N s/m or N m s/rad]
 GRID = 0.1  # [rad] between the angles about which the body is linearised
+JITTER = 0.1  # of the mean interval, a difference that gains need not follow
+SETTLED = 1e-5  # relative change of the variances in a row, below which they are taken for constant
 UNSETTLED = 100.0  # how much noisier forces count while the state is settling
 
 
@@ -139,13 +140,103 @@ def transition_over(a, dt, transition):
     """exp(A dt) to third order, written to `transition`; A has the slopes `a` of the accelerations."""
     joints, n = a.shape
     for j in range(joints):
-        for l in range(n):
-            second = a[j, l - joints] if l >= joints else 0.0
-            for i in range(joints):
-                second += a[j, joints + i] * a[i, l]
-            transition[j, l] = (1.0 if j == l else 0.0) + (dt if l == joints + j else 0.0)
-            transition[j, l] += 0.5 * dt * dt * a[j, l] + dt**3 / 6.0 * second
-            transition[joints + j, l] = (1.0 if l == joints + j else 0.0) + dt * a[j, l] + 0.5 * dt * dt * second
+        for i in range(n):
+            second = a[j, i - joints] if i >= joints else 0.0
+            for q in range(joints):
+                second += a[j, joints + q] * a[q, i]
+            transition[j, i] = (1.0 if j == i else 0.0) + (dt if i == joints + j else 0.0)
+            transition[j, i] += 0.5 * dt * dt * a[j, i] + dt**3 / 6.0 * second
+            transition[joints + j, i] = (1.0 if i == joints + j else 0.0) + dt * a[j, i] + 0.5 * dt * dt * second
+
+
+@cached
+def _factorise(s, factor, inverse):
+    """Cholesky factor of a small matrix, and the inverse of the factor."""
+    m = len(s)
+    factor[:] = 0.0
+    inverse[:] = 0.0
+    for c in range(m):
+        for d in range(c + 1):
+            total = s[c, d]
+            for q in range(d):
+                total -= factor[c, q] * factor[d, q]
+            factor[c, d] = np.sqrt(max(total, 1e-300)) if c == d else total / factor[d, d]
+    for d in range(m):
+        inverse[d, d] = 1.0 / factor[d, d]
+        for c in range(d + 1, m):
+            total = 0.0
+            for q in range(d, c):
+                total -= factor[c, q] * inverse[q, d]
+            inverse[c, d] = total / factor[c, c]
+
+
+@cached
+def _times(a, b, out):
+    """Product of two small matrices, without the overhead of a library call."""
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            total = 0.0
+            for q in range(a.shape[1]):
+                total += a[i, q] * b[q, j]
+            out[i, j] = total
+
+
+@cached
+def _correct(covariance, h, sensor, gain, inverse, work):
+    """Kalman gain (n, m) and inverse factor of the innovations' covariance; the covariance after the correction."""
+    ph, s, factor, half, after = work
+    n, m = gain.shape
+    _times(covariance, h.T, ph)
+    _times(h, ph, s)
+    for c in range(m):
+        s[c, c] += sensor[c]
+    _factorise(s, factor, inverse)
+    _times(ph, inverse.T, half)
+    _times(half, inverse, gain)
+    _times(gain, ph.T, after)
+    for i in range(n):  # rounding must not make it lopsided
+        for j in range(i + 1):
+            covariance[i, j] -= 0.5 * (after[i, j] + after[j, i])
+            covariance[j, i] = covariance[i, j]
+
+
+@cached
+def _predict(covariance, transition, b, force, dt, half, after):
+    """The covariance one interval later; forces are white noise held over the interval."""
+    joints = len(force)
+    _times(transition, covariance, half)
+    _times(half, transition.T, after)
+    for i in range(joints):
+        for j in range(joints):
+            drive = 0.0
+            for q in range(joints):
+                drive += b[i, q] * b[j, q] * force[q]
+            after[i, j] += drive * dt**3 / 3.0
+            after[i, joints + j] += drive * 0.5 * dt * dt
+            after[joints + i, j] += drive * 0.5 * dt * dt
+            after[joints + i, joints + j] += drive * dt
+    covariance[:] = after
+
+
+@cached
+def _settled(covariance, before):
+    """Whether the variances hardly changed; remembers them."""
+    settled = True
+    for i in range(len(before)):
+        settled = settled and abs(covariance[i, i] - before[i]) < SETTLED * covariance[i, i]
+        before[i] = covariance[i, i]
+    return settled
+
+
+@cached
+def _seen_by(channels, late, joints):
+    """What the channels see of the state, shape (m, n): a late sensor sees d seconds of the rate less."""
+    h = np.zeros((len(channels), 2 * joints))
+    for c in range(len(channels)):
+        h[c, channels[c]] = 1.0
+        if channels[c] < joints:
+            h[c, channels[c] + joints] = -late[channels[c]]
+    return h
 
 
 @cached
@@ -155,106 +246,29 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
     n, m = 2 * joints, len(channels)
     gains = np.zeros((rows, recordings, n, n))
     whitening = np.zeros((rows, recordings, m, m))
-    transition, covariance, half = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    before = np.zeros((n, n))
-    h = np.zeros((m, n))
-    ph, s, factor, inverse = np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m))
-    for c in range(m):
-        h[c, channels[c]] = 1.0
-        if channels[c] < joints:
-            h[c, channels[c] + joints] = -late[channels[c]]
+    covariance, transition, half, after = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    gain, inverse, before = np.zeros((n, m)), np.zeros((m, m)), np.zeros(n)
+    work = (np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((n, m)), np.zeros((n, n)))
+    h = _seen_by(channels, late, joints)
     for r in range(recordings):
         # The first state is read off noisy rows: coordinates within some noise, rates within that over 20 ms.
         covariance[:] = 0.0
         for j in range(joints):
             covariance[j, j] = 9.0 * sensor[j]
             covariance[joints + j, joints + j] = 9.0 * sensor[j] / 0.02**2
-        steady = False
+        steady, usual = False, intervals[: last[r], r].mean()
         for k in range(last[r] + 1):
             if not steady:
-                # Innovation covariance, its Cholesky factor and the inverse of that.
-                for i in range(n):
-                    for c in range(m):
-                        total = 0.0
-                        for l in range(n):
-                            total += covariance[i, l] * h[c, l]
-                        ph[i, c] = total
-                for c in range(m):
-                    for d in range(m):
-                        total = sensor[c] if c == d else 0.0
-                        for l in range(n):
-                            total += h[c, l] * ph[l, d]
-                        s[c, d] = total
-                factor[:] = 0.0
-                inverse[:] = 0.0
-                for c in range(m):
-                    for d in range(c + 1):
-                        total = s[c, d]
-                        for l in range(d):
-                            total -= factor[c, l] * factor[d, l]
-                        factor[c, d] = np.sqrt(max(total, 1e-300)) if c == d else total / factor[d, d]
-                for d in range(m):
-                    inverse[d, d] = 1.0 / factor[d, d]
-                    for c in range(d + 1, m):
-                        total = 0.0
-                        for l in range(d, c):
-                            total -= factor[c, l] * inverse[l, d]
-                        inverse[c, d] = total / factor[c, c]
+                _correct(covariance, h, sensor, gain, inverse, work)
             whitening[k, r] = inverse
-            for i in range(n):
-                for c in range(m):
-                    total = 0.0
-                    for d in range(m):
-                        weight = 0.0
-                        for l in range(max(c, d), m):
-                            weight += inverse[l, c] * inverse[l, d]
-                        total += ph[i, d] * weight
-                    gains[k, r, i, channels[c]] = total
-            if k == last[r] or steady and _alike(place, intervals, k, r):
-                continue
-            steady = False
-            for i in range(n):
-                for l in range(n):
-                    total = covariance[i, l]
-                    for c in range(m):
-                        total -= gains[k, r, i, channels[c]] * ph[l, c]
-                    half[i, l] = total
-            for i in range(n):  # rounding must not make it lopsided
-                for l in range(n):
-                    covariance[i, l] = 0.5 * (half[i, l] + half[l, i])
-            dt = intervals[k, r]
-            g = place[k, r]
-            transition_over(a[g], dt, transition)
-            for i in range(n):
-                for l in range(n):
-                    total = 0.0
-                    for q in range(n):
-                        total += transition[i, q] * covariance[q, l]
-                    half[i, l] = total
-            louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
-            change, size = 0.0, 0.0
-            for i in range(n):
-                for l in range(i, n):
-                    total = 0.0
-                    for q in range(n):
-                        total += half[i, q] * transition[l, q]
-                    if i % joints == l % joints or joints == 2:
-                        drive = 0.0
-                        for q in range(joints):
-                            drive += b[g, i % joints, q] * b[g, l % joints, q] * force[q]
-                        span = dt if i >= joints and l >= joints else (0.5 * dt * dt if l >= joints else dt**3 / 3.0)
-                        total += louder * drive * span
-                    covariance[i, l] = total
-                    covariance[l, i] = total
-                change = max(change, abs(covariance[i, i] - before[i, i]) / covariance[i, i])
-            for i in range(n):
-                for l in range(n):
-                    before[i, l] = covariance[i, l]
-            steady = change < 1e-7 and louder == 1.0
+            for c in range(m):
+                gains[k, r, :, channels[c]] = gain[:, c]
+            if k == last[r]:
+                break
+            alike = place[k, r] == place[max(k, 1) - 1, r] and abs(intervals[k, r] - usual) < JITTER * usual
+            if not steady or not alike:
+                transition_over(a[place[k, r]], intervals[k, r], transition)
+                louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
+                _predict(covariance, transition, b[place[k, r]], louder * force, intervals[k, r], half, after)
+                steady = _settled(covariance, before) and alike and louder == 1.0
     return gains, whitening
-
-
-@cached
-def _alike(place, intervals, k, r):
-    """Whether row k is followed by the same interval, at the same place, as row k - 1."""
-    return k > 0 and place[k, r] == place[k - 1, r] and abs(intervals[k, r] - intervals[k - 1, r]) < 1e-6

@@ -15,7 +15,7 @@ from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import Follower
+from wipx.diagnose.follower import LARGEST, Follower
 from wipx.diagnose.hypothesis import Hypothesis, Setting
 from wipx.diagnose.log import Log
 from wipx.diagnose.observer import NoiseLevels
@@ -29,6 +29,7 @@ ROUNDS = 3  # of noise levels and values in turn
 OVERWHELMING = 0.05  # nats for every recorded value: errors from row to row 5 % smaller throughout
 QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins [s^0.5]
 GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
+RUN_AWAY = 0.01  # share of rows in which a model is nowhere near the recording
 LEAST_MOTION = 0.005  # [m, rad] that a recorded robot travels
 ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
 
@@ -269,4 +270,13 @@ def _polished(fitter: Fitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fi
         fit = fitter.polished(fitter.fit(hypothesis, levels), rounds=ROUNDS)
     except np.linalg.LinAlgError:
         return None
-    return fit if np.isfinite(fit.log_likelihood) else None
+    return None if _runs_away(fitter, fit) or not np.isfinite(fit.log_likelihood) else fit
+
+
+def _runs_away(fitter: Fitter, fit: Fit) -> bool:
+    """Whether innovations are at the bound of what is counted; the colour takes a constant for no error at all."""
+    follower, levels = fitter.follower, fit.levels
+    batch = fit.hypothesis.space.batch(fit.hypothesis.cube)
+    gains = follower.gains(levels, fit.hypothesis.model)
+    innovations = follower.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
+    return float(np.mean(np.abs(innovations) >= LARGEST)) > RUN_AWAY

@@ -20,11 +20,11 @@ from wipx.diagnose.screening import Prospect, prospects
 MOST_EFFECTS = 4
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
-CONSIDERED = 8  # effects that are fitted in each step
+CONSIDERED = 6  # effects that are fitted in each step
 PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
 STARTS = 2  # of each effect
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
-POLISHED = 4  # effects for which they are, at most
+POLISHED = 3  # effects for which they are, at most
 WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
 EXCHANGES = 3  # rounds at most
 
@@ -46,6 +46,7 @@ class Selection:
     considered: list[Candidate] = field(default_factory=list)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
+    _prospects: dict[int, tuple[Fit, list[Prospect]]] = field(default_factory=dict)
 
     def run(self) -> Fit:
         """The fit of the effects that are missing; `nominal` where none is."""
@@ -83,6 +84,12 @@ class Selection:
         if key not in self._extensions:
             self._extensions[key] = self._extended(fit)
         return self._extensions[key]
+
+    def prospects_of(self, fit: Fit) -> list[Prospect]:
+        """Where to start for every effect that could be added, the best first."""
+        if id(fit) not in self._prospects:
+            self._prospects[id(fit)] = (fit, prospects(self.fitter, self.setting, fit))
+        return self._prospects[id(fit)][1]
 
     def caught_up(self, fit: Fit, larger: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of a larger fit.
@@ -158,7 +165,7 @@ class Selection:
         return max(4.0, LEAST_SHARE * (best.log_likelihood - self.nominal.log_likelihood))
 
     def _extended(self, fit: Fit) -> list[Fit]:
-        ranked = prospects(self.fitter, self.setting, fit)
+        ranked = self.prospects_of(fit)
         by_effect: dict[str, list[Prospect]] = {}
         for prospect in ranked:
             by_effect.setdefault(prospect.effect, []).append(prospect)

@@ -54,13 +54,14 @@ def with_curve(fitter: Fitter, setting: Setting, fit: Fit, leftover: Leftover) -
     shape = leftover.shape
     name = f"{fitter.follower.log.plant.joints[shape.joint]}/remainder"
     force = np.zeros(KNOTS)
-    current, spread = fit, np.zeros(KNOTS)
+    log = fitter.follower.log
+    current = fitter.fit(with_force(setting, fit, name, shape, force, log), fit.levels, steps=0)
+    spread = np.zeros(KNOTS)
     for _ in range(ROUNDS):
         again = leftovers(fitter, current, [shape])[0]
         change, spread = process_mean(again.slopes, current.white.ravel(), shape.knots)
         force = force + change
-        grown = with_force(setting, fit, name, shape, force, fitter.follower.log)
-        found = fitter.fit(grown, current.levels, steps=3)
+        found = fitter.fit(with_force(setting, fit, name, shape, force, log), current.levels, steps=3)
         if found.log_likelihood < current.log_likelihood + 0.5:
             break
         current = found

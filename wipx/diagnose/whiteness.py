@@ -74,24 +74,27 @@ def _whitened(innovations, counted, lags, weights, whitening):
     out = np.zeros((models, recordings, m, rows))
     left = np.zeros((m, rows))
     for r in range(recordings):
-        first, last = rows, 0
-        for k in range(rows):  # rows that count follow each other
-            if counted[k, r]:
-                first, last = min(first, k), max(last, k)
+        first = np.argmax(counted[:, r])  # rows that count follow each other
+        last = first + counted[:, r].sum() - 1
         for p in range(models):
-            z = innovations[p, r]
-            for c in range(m):
-                for k in range(first, last + 1):
-                    left[c, k] = z[c, k]
-                for i in range(len(lags)):
-                    lag = lags[i]
-                    for d in range(m):
-                        weight = weights[i * m + d, c]
-                        for k in range(first + lag, last + 1):
-                            left[c, k] -= weight * z[d, k - lag]
-            for c in range(m):
-                for d in range(c + 1):
-                    weight = whitening[c, d]
-                    for k in range(first, last + 1):
-                        out[p, r, c, k] += weight * left[d, k]
+            _whiten_one(innovations[p, r], lags, weights, whitening, first, last, left, out[p, r])
     return out
+
+
+@cached
+def _whiten_one(z, lags, weights, whitening, first, last, left, out):
+    """One recording (m, K + 1) of one model; the innermost loops run along its rows."""
+    m = len(z)
+    for c in range(m):
+        for k in range(first, last + 1):
+            left[c, k] = z[c, k]
+        for i in range(len(lags)):
+            for d in range(m):
+                weight = weights[i * m + d, c]
+                for k in range(first + lags[i], last + 1):
+                    left[c, k] -= weight * z[d, k - lags[i]]
+    for c in range(m):
+        for d in range(c + 1):
+            weight = whitening[c, d]
+            for k in range(first, last + 1):
+                out[c, k] += weight * left[d, k]

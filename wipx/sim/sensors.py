@@ -84,10 +84,8 @@ def feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise
 def correct(S, on, past, lanes, k, lane0, count, measured, gains, group):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
-    Args:
-        measured: Recorded coordinates and rates, shape (K + 1, 4, R).
-        gains: Shape (groups, K + 1, R, 4 states, 4 channels); zero where nothing was measured.
-        group: Which gains each model has, shape (P,).
+    `measured` has coordinates and rates, shape (K + 1, 4, R); `gains` the shape (groups, K + 1, R, 4 states,
+    4 channels), zero where nothing was measured; `group` says which of them each model has.
     """
     windows = measured.shape[2]
     for w in range(count):
