@@ -98,7 +98,7 @@ def diagnose(
     chosen = selection.run()
     watcher("what is left over", 0.6)
     chosen = case.without_irrelevant(selection, chosen)
-    shapes = shapes_of(case.fitter.follower)
+    shapes = shapes_of(case.fitter, chosen)
     rest = case.remaining(selection, chosen, shapes)
     watcher("held-out recordings", 0.75)
     answer = case.answer(selection, rest, shapes)

@@ -8,13 +8,13 @@ import numpy as np
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnose.log import Log
 from wipx.diagnose.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
+from wipx.diagnose.whiteness import LARGEST
 from wipx.identify.prediction import true_state
-from wipx.sim.analytic import AnalyticSimulator, Observer
+from wipx.sim.analytic import AnalyticSimulator, Observer, Rollouts
 from wipx.sim.cache import cached
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
 DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
-LARGEST = 1e3  # standard deviations; a model that falls over is counted so far
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,22 @@ class Follower:
             spread: Half width of the single commands, shape (P,) [N or N m].
         """
         log = self.log
-        start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
-        corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
+        shown = self._shown(batch, gains, group, spread)
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
-        shown = self.simulator.follow(batch, log.inputs, start, Observer(log.measured, corrections, group, spread))
         return _innovations(
             log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last
+        )
+
+    def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
+        """Coordinates and rates that a model expects before it sees each row, shape (K + 1, 2 joints, R)."""
+        shown = self._shown(ModelBatch(model), (gains,), np.zeros(1, dtype=np.int64), np.array([spread]))
+        return np.concatenate([shown.coordinates, shown.rates], axis=1)[:, :, 0]
+
+    def _shown(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray) -> Rollouts:
+        start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
+        corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
+        return self.simulator.follow(
+            batch, self.log.inputs, start, Observer(self.log.measured, corrections, group, spread)
         )
 
     @cached_property

@@ -11,7 +11,6 @@ import numpy as np
 from scipy import stats
 
 from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import Follower
 from wipx.diagnose.log import Log
 from wipx.diagnose.observer import Gains, Linearisation, transition_over
 from wipx.diagnose.robust import stretches, sums_over
@@ -20,7 +19,6 @@ from wipx.effects.remainder import KNOTS
 from wipx.sim.cache import cached
 
 ENDS = (0.005, 0.995)  # quantiles of a signal between which its knots lie
-RATE_SPAN = 0.03  # [s] over which rates are differenced where none is recorded
 FREQUENCIES = np.geomspace(0.5, 16.0, 12)  # [Hz] of resonances that are looked for
 DAMPING = 0.05  # ratio, of the same
 RIDGE = 1e-9
@@ -62,15 +60,17 @@ class Leftover:
     slopes: np.ndarray
 
 
-def signals_of(follower: Follower) -> dict[str, np.ndarray]:
-    """Recorded coordinates, rates, commands and time at every row, shape (K + 1, R) each."""
-    log = follower.log
+def signals_of(fitter: Fitter, fit: Fit) -> dict[str, np.ndarray]:
+    """Coordinates, rates, commands and time at every row, shape (K + 1, R) each.
+
+    Coordinates and rates are those that the fit's observer expects: a force made of them knows nothing of the
+    noise of the row that it is tested on.
+    """
+    log = fitter.follower.log
     plant = log.plant
-    signals: dict[str, np.ndarray] = {}
-    for j, name in enumerate(plant.coordinates):
-        signals[name] = log.measured[:, j]
-    for j, name in enumerate(plant.rates):
-        signals[name] = log.measured[:, log.joints + j] if log.joints + j in log.channels else _rates(follower, j)
+    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
+    state = fitter.follower.estimated(fit.hypothesis.model, gains, fit.levels.spread)
+    signals = {name: state[:, i] for i, name in enumerate((*plant.coordinates, *plant.rates))}
     for c, name in enumerate(plant.commands):
         commands = log.inputs.commands[:, c]
         signals[name] = np.concatenate([commands, commands[-1:]])
@@ -78,10 +78,10 @@ def signals_of(follower: Follower) -> dict[str, np.ndarray]:
     return signals
 
 
-def shapes_of(follower: Follower) -> list[Shape]:
-    """All families of forces that are looked at."""
-    log = follower.log
-    signals = signals_of(follower)
+def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
+    """All families of forces that are looked at, over the motion as a fit sees it."""
+    log = fitter.follower.log
+    signals = signals_of(fitter, fit)
     found = []
     for joint, site in enumerate(log.plant.joints):
         for name, values in signals.items():
@@ -93,7 +93,7 @@ def shapes_of(follower: Follower) -> list[Shape]:
             knots, hats = _hats(signals["t"], log.rows)
             if knots is not None:
                 found.append(Shape(joint, "gain", "t", knots, hats * command))
-        forces, rates = _swings(follower, joint, signals)
+        forces, rates = _swings(log, joint, signals)
         found += [
             Shape(joint, "resonance", f"{frequency:.2g}", np.zeros(0), np.stack([forces[i], rates[i]]))
             for i, frequency in enumerate(FREQUENCIES)
@@ -187,22 +187,8 @@ def _hats(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray | None, np.n
     return knots, hats * rows
 
 
-def _rates(follower: Follower, joint: int) -> np.ndarray:
-    """Rates of a coordinate by central differences over `RATE_SPAN`, shape (K + 1, R)."""
-    log = follower.log
-    rates = np.zeros(log.rows.shape)
-    for r, recording in enumerate(log.recordings):
-        t, q = recording.t, recording[log.plant.coordinates[joint]]
-        rows = np.arange(len(t))
-        reach = max(1, round(0.5 * RATE_SPAN * recording.rate))
-        before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(t) - 1)
-        rates[: len(t), r] = (q[after] - q[before]) / (t[after] - t[before])
-    return rates
-
-
-def _swings(follower: Follower, joint: int, signals: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _swings(log: Log, joint: int, signals: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Force of a unit mass that swings along with a joint, and its rate, shape (len(FREQUENCIES), K + 1, R) each."""
-    log = follower.log
     q, rate = signals[log.plant.coordinates[joint]], signals[log.plant.rates[joint]]
     pulsation = 2.0 * np.pi * FREQUENCIES
     return _swung(q, rate, log.intervals, pulsation, DAMPING)

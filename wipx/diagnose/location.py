@@ -43,7 +43,7 @@ def located(
         return Location({}, (), (), None)
     excess = excess_of(fitter, nominal, completed)
     log = fitter.follower.log
-    signals = signals_of(fitter.follower)
+    signals = signals_of(fitter, nominal)
     regions = _named_regions(effects, signals, excess, log) or _found_regions(signals, excess, log)
     return Location(_sites(effects, rest), regions, _periods(effects, excess, log), _map(log, signals, excess))
 

@@ -12,6 +12,7 @@ import numpy as np
 from wipx.diagnose.log import Log
 from wipx.sim.cache import cached
 
+LARGEST = 1e3  # standard deviations up to which an innovation is counted
 LAGS = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])  # rows
 
 
@@ -34,12 +35,14 @@ def colour_of(innovations: np.ndarray, log: Log) -> Colour:
     """The autoregression of innovations, shape (R, m, K + 1)."""
     past, now = _past_and_present(innovations, log.counted, LAGS)
     normal = past.T @ past
-    normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal)
+    normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal) + 1e-12
     weights = np.linalg.solve(normal, past.T @ now)
     left = now - past @ weights
     covariance = left.T @ left / len(left)
-    factor = np.linalg.cholesky(covariance + 1e-300 * np.eye(len(covariance)))
+    factor = np.linalg.cholesky(covariance + (1e-9 * np.trace(covariance) + 1e-12) * np.eye(len(covariance)))
     log_likelihood = -len(left) * float(np.log(np.diag(factor)).sum())
+    # Where the model ran away innovations stand at their limit, which a regression takes for well predicted.
+    log_likelihood -= LARGEST * np.count_nonzero(np.abs(now) >= LARGEST)
     return Colour(weights, np.linalg.inv(factor), log_likelihood)
 
 
