@@ -6,6 +6,7 @@ The robots, their equations of motion and the scoring are in `wipx.concealed`.
 import csv
 import io
 import multiprocessing
+import os
 import secrets
 import subprocess
 import sys
@@ -27,6 +28,8 @@ from wipx.tasks.job import Job
 from wipx.tasks.results import write_json, written_together
 
 RESULT, SEED = "result.json", "seed.json"
+
+ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # a worker has one core
 
 
 @dataclass(frozen=True)
@@ -145,10 +148,10 @@ def _unseen_errors(folder: Path, answer: Path, time_limit: float) -> UnseenError
 
 def _call(task: str, recordings: Path, out: Path, time_limit: float, *more: str) -> str:
     """Run a task of this program; returns why it failed, empty where it did not."""
-    command = [sys.executable, "-m", "wipx", f"task={task}", "tracking=none"]
+    command = [sys.executable, "-m", "wipx", f"task={task}", "tracking=none", "sim.threads=1"]
     command += [f"recordings.path='{recordings.resolve()}'", f"hydra.run.dir='{out.resolve()}'", *more]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=time_limit, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=time_limit, check=False, env=ONE_THREAD)
     except subprocess.TimeoutExpired:
         return f"no answer within {time_limit:g} s"
     if done.returncode == 0:

@@ -3,14 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import check_positive
-from wipx.diagnose.diagnosis import Robot, diagnose
+from wipx.diagnosis.case import Robot, diagnose
+from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
-from wipx.tasks.identify import feedback_of
 from wipx.tasks.job import Job
 from wipx.tasks.progress import StageProgress
 from wipx.tasks.results import flat, write_csv, write_json, written_together
@@ -44,8 +46,9 @@ class Diagnose:
                 robot,
                 job.part("sim"),
                 title=source.name,
-                source=str(source.path),
+                source=str(source.path) if source.robot is None else "recordings.robot",
                 lead=self.lead,
+                rng=np.random.default_rng(job.seed),
                 watcher=progress,
             )
         with written_together(job.out) as folder:

@@ -14,11 +14,11 @@ from wipx.effects.catalogue import effect_of
 from wipx.identify.identification import Identified, Request, identify
 from wipx.identify.objectives import Objective
 from wipx.identify.windows import check_long_enough
+from wipx.library import feedback_of
 from wipx.recordings.model_file import read_model, write_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
 from wipx.report.tables import summary
-from wipx.sim.analytic import StateFeedback
 from wipx.tasks.job import Job
 from wipx.tasks.progress import SearchProgress
 from wipx.tasks.results import flat, write_csv, write_json, written_together
@@ -79,13 +79,6 @@ class Identify:
         nominal = nominal.with_effects(friction.given(nominal, earlier))
         switched_on = tuple(dict.fromkeys((*friction.switched_on(nominal, earlier), *job.effects)))
         return Request(nominal, switched_on, robot.uncertainty, job.free, job.bounds, feedback_of(robot))
-
-
-def feedback_of(robot: RobotDescription) -> tuple[StateFeedback, float] | None:
-    """The robot's controller and its rate [Hz]; None where it is not described."""
-    if robot.controller is None:
-        return None
-    return StateFeedback(np.array(robot.controller.gains)), robot.controller.rate
 
 
 def _result(

@@ -9,12 +9,12 @@ from identify.emulated_robot import Robot, nominal_model
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import Follower
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.log import Log
-from wipx.diagnose.observer import NoiseLevels
-from wipx.diagnose.sanity import Slip, check_plausible, slips
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.sanity import Slip, check_plausible, slips
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.recordings.source import RecordingSource

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import minimize
 
 from wipx.core.diagnosis import Curve
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.leftover import Leftover, Shape, leftovers
-from wipx.diagnose.log import Log
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.leftover import Leftover, Shape, leftovers
+from wipx.diagnosis.log import Log
 from wipx.effects.remainder import COMMANDS, KNOTS, TIME
 from wipx.sim.coefficients import joint_index
 

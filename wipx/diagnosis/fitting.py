@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from wipx.core.model import ModelBatch
-from wipx.diagnose.follower import Follower
-from wipx.diagnose.hypothesis import Hypothesis
-from wipx.diagnose.observer import Gains, NoiseLevels
-from wipx.diagnose.whiteness import Colour, colour_of, whitened
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.observer import Gains, NoiseLevels
+from wipx.diagnosis.whiteness import Colour, colour_of, whitened
 
 FIRST_STEP = 1e-4  # of the search interval, for the first slopes
 LARGEST_STEP = 0.02

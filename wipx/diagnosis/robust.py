@@ -7,8 +7,8 @@ much the plain covariance is too small.
 
 import numpy as np
 
-from wipx.diagnose.fitting import Fit
-from wipx.diagnose.log import Log
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.log import Log
 
 STRETCH = 0.5  # [s]; several times the memory of the innovations
 

@@ -10,14 +10,14 @@ from identify.emulated_robot import RATE, Robot, controller, nominal_model
 from wipx.core.diagnosis import NextExperiment
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnose.experiment import Question, next_experiment
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import Follower
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.log import Log
-from wipx.diagnose.menu import DURATION, Reach, menu
-from wipx.diagnose.observer import NoiseLevels
-from wipx.diagnose.trial import FURTHER, STRONGER, Bench
+from wipx.diagnosis.experiment import Question, next_experiment
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.menu import DURATION, Reach, menu
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.trial import FURTHER, STRONGER, Bench
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator

@@ -6,9 +6,9 @@ import numpy as np
 
 from wipx.core.diagnosis import Curve
 from wipx.core.words import effect_in_words
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.leftover import Shape, leftovers
-from wipx.diagnose.stand_in import process_mean
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.leftover import Shape, leftovers
+from wipx.diagnosis.stand_in import process_mean
 
 POINTS = 201
 OVER_RATE = (

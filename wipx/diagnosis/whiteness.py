@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.diagnose.log import Log
+from wipx.diagnosis.log import Log
 from wipx.sim.cache import cached
 
 LARGEST = 1e3  # standard deviations up to which an innovation is counted

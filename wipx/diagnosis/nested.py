@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from wipx.diagnose.fitting import Fit
-from wipx.diagnose.log import Log
-from wipx.diagnose.robust import covariance
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.robust import covariance
 from wipx.identify.noise import quantisation
 
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen

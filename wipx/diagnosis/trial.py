@@ -6,10 +6,10 @@ import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnose.hypothesis import Hypothesis
-from wipx.diagnose.log import Log
-from wipx.diagnose.menu import DURATION, Excitation, Reach, payload_height, rate_of
-from wipx.diagnose.observer import NoiseLevels
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.menu import DURATION, Excitation, Reach, payload_height, rate_of
+from wipx.diagnosis.observer import NoiseLevels
 from wipx.sim.analytic import AnalyticSimulator, Rollouts, StateFeedback
 from wipx.sim.inputs import Inputs
 

@@ -11,9 +11,9 @@ import numpy as np
 from wipx.core.diagnosis import ErrorMap, FoundEffect, Location, Period, Region
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.leftover import signals_of
-from wipx.diagnose.log import Log
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.leftover import signals_of
+from wipx.diagnosis.log import Log
 
 BINS = 24  # of a map, along each axis
 RUN_BINS = 40  # along each recording

@@ -6,25 +6,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.diagnosis import Alternative, Bound, Diagnosis, FoundEffect, Unexplained, Verdict
+from wipx.core.diagnosis import Alternative, Bound, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words
-from wipx.diagnose.curves import law_curve
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import Follower
-from wipx.diagnose.heldout import Transfer, judged, transfer
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.leftover import Leftover, Shape, leftovers, shapes_of
-from wipx.diagnose.location import located
-from wipx.diagnose.log import Log
-from wipx.diagnose.nested import simpler
-from wipx.diagnose.observer import NoiseLevels
-from wipx.diagnose.robust import covariance, inflation
-from wipx.diagnose.screening import prospects
-from wipx.diagnose.selection import Selection
-from wipx.diagnose.stand_in import curve_of, with_curve
+from wipx.diagnosis.curves import law_curve
+from wipx.diagnosis.experiment import Question, next_experiment
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.heldout import Transfer, judged, transfer
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
+from wipx.diagnosis.location import located
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.nested import simpler
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.robust import covariance, inflation
+from wipx.diagnosis.sanity import check_plausible
+from wipx.diagnosis.screening import prospects
+from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.stand_in import curve_of, with_curve
 from wipx.effects.catalogue import effect_of
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
@@ -69,8 +71,9 @@ def diagnose(
     simulator: AnalyticSimulator,
     *,
     title: str = "",
-    source: str = "",
+    source: str = "robot.yaml",
     lead: float = 0.3,
+    rng: np.random.Generator | None = None,
     watcher: Watcher = unwatched,
 ) -> Diagnosis:
     """Find out what physics a nominal model lacks.
@@ -82,10 +85,11 @@ def diagnose(
         title: Of the page.
         source: Where the recordings come from.
         lead: Time before a prediction from which its state is estimated [s].
+        rng: Draws the excitations of the next experiment; None for always the same.
         watcher: Told the stage and the share that is done.
 
     Raises:
-        InputError: a recording is too short.
+        InputError: a recording is too short, or the recordings contradict the nominal model grossly.
     """
     begun = time.perf_counter()
     check_long_enough(recordings)
@@ -95,6 +99,9 @@ def diagnose(
     nominal = case.fitter.polished(case.fitter.fit(start, case.first_levels))
     selection = Selection(case.fitter, case.setting, nominal)
     watcher("looking for missing effects", 0.1)
+    first = selection.extensions(nominal)
+    check_plausible(case.fitter, case.setting, selection.nominal, first[0] if first else nominal, source)
+    watcher("looking for combinations", 0.3)
     chosen = selection.run()
     watcher("what is left over", 0.6)
     chosen = case.without_irrelevant(selection, chosen)
@@ -102,6 +109,9 @@ def diagnose(
     rest = case.remaining(selection, chosen, shapes)
     watcher("held-out recordings", 0.75)
     answer = case.answer(selection, rest, shapes)
+    watcher("next experiment", 0.9)
+    proposal = case.proposal(selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    answer = replace(answer, next_experiment=proposal)
     watcher("done", 1.0)
     return replace(answer, title=title, source=source, seconds=time.perf_counter() - begun)
 
@@ -223,6 +233,31 @@ class _Case:
             seconds=0.0,
         )
         return replace(draft, sentence=sentence(draft))
+
+    def proposal(
+        self,
+        selection: Selection,
+        fit: Fit,
+        answer: Diagnosis,
+        feedback: tuple[StateFeedback, float] | None,
+        rng: np.random.Generator,
+    ) -> NextExperiment | None:
+        """The experiment that settles what is tied or weak; None where nothing is."""
+        tied = [(effect.name, name) for effect in answer.effects for name in effect.equivalent]
+        rivals = [
+            other
+            for effect, name in tied
+            for other in selection.replacements(fit, effect)
+            if name in other.effects and effect not in other.effects
+        ]
+        weak = tuple(p.name for effect in answer.effects for p in effect.parameters if is_wide(p))
+        if not rivals and not weak:
+            return None
+        questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
+        question = Question(f"Open: {', '.join(questions)}.", tuple(rivals), weak)
+        closed, rate = feedback if feedback is not None else (None, self.recordings[0].rate)
+        simulator = self.fitter.follower.simulator
+        return next_experiment(question, fit, self.setting, self.log, simulator, closed, rate, rng)
 
     def _units(self) -> dict[str, str]:
         plant = self.log.plant
@@ -358,12 +393,16 @@ class _Case:
         found = []
         for effect in effects:
             for p in effect.parameters:
-                size = max(abs(p.value - p.nominal) if effect.law and p.nominal == p.nominal else 0.0, 1e-300)
-                if 0.5 * (p.high - p.low) > WIDE * max(size, abs(p.value)):
+                if is_wide(p):
                     found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
             for name in effect.equivalent:
                 found.append(f"{effect.name} cannot be told from {name}")
         return tuple(found)
+
+
+def is_wide(p: Estimate) -> bool:
+    """Whether the interval of a number is wide beside the number itself."""
+    return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
 
 
 def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
-from wipx.diagnose.log import SETTLES, Log
+from wipx.diagnosis.log import SETTLES, Log
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.cache import cached
 from wipx.sim.inputs import Inputs

@@ -14,12 +14,13 @@ from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.follower import LARGEST, Follower
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.log import Log
-from wipx.diagnose.observer import NoiseLevels
-from wipx.diagnose.selection import Selection
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.whiteness import LARGEST
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.log import Log
-from wipx.diagnose.observer import Gains, Linearisation, transition_over
-from wipx.diagnose.robust import stretches, sums_over
-from wipx.diagnose.whiteness import whitened
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import Gains, Linearisation, transition_over
+from wipx.diagnosis.robust import stretches, sums_over
+from wipx.diagnosis.whiteness import whitened
 from wipx.effects.remainder import KNOTS
 from wipx.sim.cache import cached
 

@@ -3,7 +3,7 @@
 Every excitation of a menu is run on the completed model. It separates the completed model from a rival as far as the
 rival, fitted to that run as well as to the recordings so far, still predicts something else (T-optimality: Atkinson,
 Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62(1)); it measures a
-number as well as the information of both says. Simulation of the run is in `wipx.diagnose.trial`.
+number as well as the information of both says. Simulation of the run is in `wipx.diagnosis.trial`.
 """
 
 from dataclasses import dataclass, replace
@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.core.diagnosis import Experiment, NextExperiment
-from wipx.diagnose.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit, Fitter
-from wipx.diagnose.follower import Follower
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.log import Log
-from wipx.diagnose.menu import Reach, how, menu, prescribed
-from wipx.diagnose.robust import covariance, inflation
-from wipx.diagnose.trial import EVENT, Bench, Trial, loaded
+from wipx.diagnosis.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.menu import Reach, how, menu, prescribed
+from wipx.diagnosis.robust import covariance, inflation
+from wipx.diagnosis.trial import EVENT, Bench, Trial, loaded
 from wipx.sim.analytic import AnalyticSimulator, StateFeedback
 
 MOST_RIVALS = 3

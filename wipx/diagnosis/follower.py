@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
-from wipx.diagnose.log import Log
-from wipx.diagnose.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
-from wipx.diagnose.whiteness import LARGEST
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
+from wipx.diagnosis.whiteness import LARGEST
 from wipx.identify.prediction import true_state
 from wipx.sim.analytic import AnalyticSimulator, Observer, Rollouts
 from wipx.sim.cache import cached

@@ -7,7 +7,7 @@ import numpy as np
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
-from wipx.diagnose.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.identify.evaluation import Judge
 
 STEPS = 3  # of refining values that are nearly right

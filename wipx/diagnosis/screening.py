@@ -13,8 +13,8 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.hypothesis import Setting
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.hypothesis import Setting
 from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional

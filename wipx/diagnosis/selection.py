@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wipx.core.diagnosis import Candidate
-from wipx.diagnose.fitting import Fit, Fitter
-from wipx.diagnose.hypothesis import Hypothesis, Setting
-from wipx.diagnose.nested import simpler
-from wipx.diagnose.robust import inflation
-from wipx.diagnose.screening import Prospect, prospects
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.nested import simpler
+from wipx.diagnosis.robust import inflation
+from wipx.diagnosis.screening import Prospect, prospects
 
 MOST_EFFECTS = 4
 LEAST_GAIN = 8.0  # nats beyond the penalty

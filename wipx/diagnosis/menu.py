@@ -1,6 +1,6 @@
 """The menu of excitations from which the next experiment is chosen: what each is, and what a person does to run it.
 
-Sizes begin at what the recordings show to be harmless; `wipx.diagnose.experiment` simulates and shrinks them.
+Sizes begin at what the recordings show to be harmless; `wipx.diagnosis.experiment` simulates and shrinks them.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ import numpy as np
 
 from wipx.core.model import Model
 from wipx.core.plant import Plant
-from wipx.diagnose.log import Log
+from wipx.diagnosis.log import Log
 
 DURATION = 10.0  # [s] of an experiment
 RAMP = 1.0  # [s] within which an excitation sets in
