@@ -5,10 +5,10 @@ READY := .venv/.ready
 RECORDINGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real test test-slow check bench lock clean
+.PHONY: help setup demo real diagnose-real test test-slow check bench lock clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(READY)  ## create .venv from requirements.lock (needs Python 3.11 or newer; PYTHON=... chooses one)
 
@@ -26,6 +26,9 @@ demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder identifies that rob
 real: $(READY)  ## identify public recordings of real robots: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx task=real_recordings task.page=docs/real_recordings.md hydra.run.dir=runs/real
 	cp runs/real/dfki_double_friction/fit.png docs/images/real_before_after.png
+
+diagnose-real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_diagnosis.md
+	$(PY) -m wipx task=real_diagnosis task.page=docs/real_diagnosis.md hydra.run.dir=runs/real_diagnosis
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -m "not slow"

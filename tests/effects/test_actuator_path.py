@@ -142,7 +142,7 @@ def test_speed_limit_reads_the_torque_speed_line_when_driving_and_stall_when_bra
 
 @given(force=st.floats(-20.0, 20.0), v=st.floats(-8.0, 8.0))
 def test_the_speed_limit_never_adds_force(force: float, v: float):
-    limited = speed_limit.limited(force, v, 8.0, 4.0)
+    limited = speed_limit.limited(force, v, 8.0, 4.0, 0.0)
     assert abs(limited) <= min(abs(force), 8.0)
     assert limited * force >= 0.0
 

@@ -76,6 +76,7 @@ class Parameter:
         high: Upper end, likewise.
         start: Where a search begins, likewise.
         grid: Values at which a diagnosis looks for the effect, likewise; empty for `start` alone.
+        default: Value where a file gives none [SI]; None where it must give one.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Parameter:
     high: float
     start: float
     grid: tuple[float, ...] = ()
+    default: float | None = None
 
     def unit(self, *, angular: bool) -> str:
         """The SI unit at a turning (`angular`) or a sliding joint."""

@@ -1,6 +1,6 @@
 """Backlash: the drive crosses a gap before it pushes the other way.
 
-The free drive is a small mass that the force accelerates; contact is inelastic. The drive's
+The free drive is a small mass in grease that the force moves; contact is inelastic. The drive's
 own momentum is not handed to the wheel, being small; a free drive as heavy as what it drives
 is outside this law: it would lose contact to the acceleration that it causes itself.
 """
@@ -21,10 +21,29 @@ EFFECT = Effect(
             0.0,
             0.3,
             2e-3,
-            grid=(0.0005, 0.002, 0.01, 0.03),
+            grid=(5e-4, 2e-3, 1e-2, 3e-2),
         ),
         Parameter(
-            "drive_inertia", "of the free drive, at the same place", "inertia", 1.0, 1e-3, 0.3, 0.02, grid=(0.005, 0.05)
+            "drive_inertia",
+            "of the free drive, at the same place",
+            "inertia",
+            1.0,
+            1e-4,
+            0.3,
+            0.02,
+            grid=(0.001, 0.05),
+            default=0.05,
+        ),
+        Parameter(
+            "drive_damping",
+            "that the free drive has in the gap",
+            "damping",
+            0.0,
+            0.0,
+            30.0,
+            0.1,
+            grid=(0.0, 0.3, 3.0),
+            default=0.0,
         ),
     ),
     law="0 while the drive crosses the gap, F in contact",
@@ -33,7 +52,7 @@ EFFECT = Effect(
 
 
 @law
-def cross(place, speed, force, joint_acceleration, gap, drive_inertia, step):
+def cross(place, speed, force, joint_acceleration, gap, drive_inertia, drive_damping, step):
     """Move the drive by one `step` in its gap.
 
     Args:
@@ -43,13 +62,15 @@ def cross(place, speed, force, joint_acceleration, gap, drive_inertia, step):
         joint_acceleration: Of the driven side.
         gap: Total play.
         drive_inertia: Of the free drive [kg or kg m^2].
+        drive_damping: On its way through the gap [N s/m or N m s/rad].
         step: Length of the step [s].
 
     Returns:
         New place, new speed, and the share of the step during which the force is passed on.
     """
     half = 0.5 * gap
-    moved_speed = speed + step * (force / drive_inertia - joint_acceleration)
+    pushed = speed + step * (force / drive_inertia - joint_acceleration)
+    moved_speed = pushed / (1.0 + step * drive_damping / drive_inertia)
     way = step * moved_speed
     target = place + way
     new_place = clip(target, -half, half)

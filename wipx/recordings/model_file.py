@@ -123,6 +123,9 @@ def _effect_values(data: object, name: str, effect: Effect, where: str) -> dict[
             raise unknown_name("parameter", symbol, symbols, where)
     values = {}
     for symbol, parameter in symbols.items():
+        if symbol not in data and parameter.default is not None:
+            values[symbol] = parameter.default
+            continue
         if symbol not in data:
             raise InputError(f"{where} lacks {symbol} ({parameter.meaning}); add it")
         value = _number(data, symbol, where)

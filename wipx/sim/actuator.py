@@ -108,6 +108,7 @@ def backlash(S, j):
             S[(R.ACCELERATION + j) * W + w],
             gap,
             S[R.DRIVE_INERTIA * W + w],
+            S[R.DRIVE_DAMPING * W + w],
             h,
         )
         S[(R.PLACE + j) * W + w] = moved

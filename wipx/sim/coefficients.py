@@ -180,7 +180,11 @@ def _actuator(f: _Filler) -> None:
         ("actuator/gain", None, {"k": R.GAIN}),
         ("actuator/saturation", R.ON_SATURATION, {"F_max": R.FORCE_MAX}),
         ("actuator/speed_limit", R.ON_SPEED_LIMIT, {"F_stall": R.STALL, "v_free": R.FREE_SPEED}),
-        ("actuator/backlash", R.ON_BACKLASH, {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA}),
+        (
+            "actuator/backlash",
+            R.ON_BACKLASH,
+            {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING},
+        ),
     ):
         _replace(f, name, flag, targets)
     lag = f.values("actuator/lag")

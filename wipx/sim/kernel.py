@@ -218,7 +218,7 @@ def rollout(
         for k in range(first_row, last_row):
             record(S, on, past, t_rows, lanes, k, out, lane0, count)
             if follows:
-                correct(S, on, past, lanes, k, lane0, count, measured, observer, group)
+                correct(S, on, past, t_rows, lanes, k, lane0, count, measured, observer, group)
             if closed:
                 feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:

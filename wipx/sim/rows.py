@@ -14,7 +14,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     ROTOR, ROTOR1,
     BALANCE, TILT, TILT_FORCE, SPRING, SPRING_REST,
     INPUT_GAIN, DELAY, OFFSET, DEAD_BAND, GAIN, FORCE_MAX, STALL, FREE_SPEED, BACK_EMF, LAG_RATE,
-    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA,
+    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING,
     VISCOUS, VISCOUS1, DRAG, DRAG1,
     LEVEL_PLUS, LEVEL_PLUS1, LEVEL_MINUS, LEVEL_MINUS1,
     STATIC, STATIC1, COULOMB, COULOMB1, STRIBECK_SPEED, STRIBECK_SPEED1,
@@ -30,7 +30,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     SMOOTHING, SMOOTHING1,  # speed over which dry friction builds up, 0 for sticking
     BIAS, BIAS1, SCALE, SCALE1, SENSOR_DELAY, SENSOR_DELAY1,
     N_COEFFICIENTS,
-) = range(121)  # fmt: skip
+) = range(122)  # fmt: skip
 
 # State of a rollout, carried from step to step.
 (

@@ -81,7 +81,7 @@ def feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise
 
 
 @law
-def correct(S, on, past, lanes, k, lane0, count, measured, gains, group):
+def correct(S, on, past, t_rows, lanes, k, lane0, count, measured, gains, group):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
     `measured` has coordinates and rates, shape (K + 1, 4, R); `gains` the shape (groups, K + 1, R, 4 states,
@@ -95,9 +95,23 @@ def correct(S, on, past, lanes, k, lane0, count, measured, gains, group):
         e1 = measured[k, 1, window] - S[R.SHOWN1 * W + w]
         e2 = measured[k, 2, window] - S[R.V * W + w]
         e3 = measured[k, 3, window] - S[R.V1 * W + w]
-        for i in range(4):
-            S[(R.Q + i) * W + w] += gain[i, 0] * e0 + gain[i, 1] * e1 + gain[i, 2] * e2 + gain[i, 3] * e3
-    if on[R.ON_SENSOR_DELAY]:
-        for i in range(4):
-            for w in range(count):
-                past[k, i, lane0 + w] = S[(R.Q + i) * W + w]
+        for j in range(2):
+            way = gain[j, 0] * e0 + gain[j, 1] * e1 + gain[j, 2] * e2 + gain[j, 3] * e3
+            rate = gain[2 + j, 0] * e0 + gain[2 + j, 1] * e1 + gain[2 + j, 2] * e2 + gain[2 + j, 3] * e3
+            S[(R.Q + j) * W + w] += way
+            S[(R.V + j) * W + w] += rate
+            if on[R.ON_SENSOR_DELAY]:
+                correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, S[(R.SENSOR_DELAY + j) * W + w])
+
+
+@law
+def correct_past(past, t_rows, window, k, j, lane, way, rate, delay):
+    """Move the course of coordinate j too, as far back as its sensor still shows it."""
+    i = k
+    while i >= 0:
+        ago = t_rows[k, window] - t_rows[i, window]
+        past[i, j, lane] += way - ago * rate
+        past[i, 2 + j, lane] += rate
+        if ago > delay:
+            break
+        i -= 1
