@@ -184,7 +184,7 @@ def test_ripple_follows_the_place_and_not_the_time():
 
 @pytest.mark.parametrize(("gap", "drive_inertia"), [(1e-3, 0.5), (4e-3, 0.2)])
 def test_backlash_gives_no_force_while_crossing_and_full_force_in_contact(gap: float, drive_inertia: float):
-    effects: Effects = {"actuator/backlash": {"gap": gap, "drive_inertia": drive_inertia}}
+    effects: Effects = {"actuator/backlash": {"gap": gap, "drive_inertia": drive_inertia, "drive_damping": 0.0}}
     commands = np.where(T[:-1] < 0.1, 3.0, -3.0)
     force = forces_of(effects, commands)
     crossing = np.sqrt(2.0 * gap * drive_inertia / 3.0)  # the free drive under its own force
@@ -197,14 +197,14 @@ def test_backlash_gives_no_force_while_crossing_and_full_force_in_contact(gap: f
 
 
 def test_a_gap_of_zero_is_no_backlash():
-    model = robot("wip", {"actuator/backlash": {"gap": 0.0, "drive_inertia": 0.3}})
+    model = robot("wip", {"actuator/backlash": {"gap": 0.0, "drive_inertia": 0.3, "drive_damping": 0.0}})
     start = (0.0, 0.05, 0.0, 0.0)
     np.testing.assert_array_equal(move(model, start, T, SINES).q, move(robot("wip"), start, T, SINES).q)
 
 
 def test_the_drive_pushes_again_only_after_the_whole_gap():
     # A reversal shorter than the crossing leaves no force on the carriage at all.
-    effects: Effects = {"actuator/backlash": {"gap": 5e-3, "drive_inertia": 0.5}}
+    effects: Effects = {"actuator/backlash": {"gap": 5e-3, "drive_inertia": 0.5, "drive_damping": 0.0}}
     commands = np.full(250, 1.0)
     commands[50:60] = -1.0  # 20 ms; crossing takes 71 ms
     force = forces_of(effects, commands)

@@ -25,7 +25,7 @@ EVERYTHING: Effects = {
     "actuator/back_emf": {"k_e": 0.5},
     "actuator/lag": {"tau": 0.004},
     "actuator/ripple": {"A": 0.3, "n": 6.0, "phase": 0.2},
-    "actuator/backlash": {"gap": 1e-3, "drive_inertia": 0.2},
+    "actuator/backlash": {"gap": 1e-3, "drive_inertia": 0.2, "drive_damping": 0.0},
     "geometry/payload": {"mass": 0.1, "height": 0.4},
     "geometry/payload_event": {"mass": 0.2, "height": 0.5, "t0": 0.1},
     "geometry/com_offset": {"theta_eq": 0.01},

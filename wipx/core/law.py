@@ -35,9 +35,8 @@ def clip(value, low, high):
 @law
 def above(excess, spread):
     """Mean of what is above zero of numbers about `excess`, triangularly distributed over +-`spread`."""
-    width = maximum(spread, 1e-12)
-    tail = maximum(width - abs(excess), 0.0)
-    return maximum(excess, 0.0) + tail * tail * tail / (6.0 * width * width)
+    tail = maximum(spread - abs(excess), 0.0)
+    return maximum(excess, 0.0) + tail * tail * tail / (6.0 * maximum(spread * spread, 1e-24))
 
 
 @law

@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.diagnosis import Alternative, Bound, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
+from wipx.core.diagnosis import (
+    Alternative,
+    Bound,
+    Candidate,
+    Diagnosis,
+    FoundEffect,
+    NextExperiment,
+    Unexplained,
+    Verdict,
+)
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.core.results import Estimate
@@ -15,7 +24,7 @@ from wipx.diagnosis.curves import law_curve
 from wipx.diagnosis.experiment import Question, next_experiment
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.follower import Follower
-from wipx.diagnosis.heldout import Transfer, judged, transfer
+from wipx.diagnosis.heldout import Transfer, judged, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.location import located
@@ -104,7 +113,7 @@ def diagnose(
     watcher("looking for combinations", 0.3)
     chosen = selection.run()
     watcher("what is left over", 0.6)
-    chosen = case.without_irrelevant(selection, chosen)
+    chosen = case.confirmed(selection, chosen)
     shapes = shapes_of(case.fitter, chosen)
     rest = case.remaining(selection, chosen, shapes)
     watcher("held-out recordings", 0.75)
@@ -154,17 +163,27 @@ class _Case:
         """The recordings."""
         return self.fitter.follower.log
 
-    def without_irrelevant(self, selection: Selection, fit: Fit) -> Fit:
-        """Without effects that change no prediction to speak of."""
-        for effect in fit.effects:
+    def confirmed(self, selection: Selection, fit: Fit) -> Fit:
+        """Without effects that change no prediction to speak of, or do not transfer to held-out recordings."""
+        if not fit.effects:
+            return fit
+        repeated = transfer(self.fitter, fit)
+        with_it = self.judge.predict(fit.hypothesis.model, self.recordings)
+        for effect in reversed(fit.effects):
             rest = tuple(e for e in fit.effects if e != effect)
             reduced = selection.fitted(rest, fit) if rest else selection.nominal
-            floor = self.judge.noise
-            with_it = self.judge.predict(fit.hypothesis.model, self.recordings)
             without = self.judge.predict(reduced.hypothesis.model, self.recordings)
             change = np.concatenate(with_it) - np.concatenate(without)
-            if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * floor):
-                return self.without_irrelevant(selection, reduced)
+            irrelevant = bool(np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * self.judge.noise))
+            known = row_likelihoods(self.fitter, reduced, reduced.white).sum(axis=1)
+            transferred = float(np.sum(repeated.likelihoods - known))
+            if irrelevant or transferred <= 0.0:
+                gain = fit.log_likelihood - reduced.log_likelihood
+                reason = (
+                    "changes no prediction to speak of" if irrelevant else "does not transfer to held-out recordings"
+                )
+                selection.considered.append(Candidate(effect, gain, False, reason))
+                return self.confirmed(selection, reduced)
         return fit
 
     def remaining(self, selection: Selection, fit: Fit, shapes: list[Shape]) -> _Rest:

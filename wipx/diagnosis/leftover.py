@@ -14,7 +14,7 @@ from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import Gains, Linearisation, transition_over
 from wipx.diagnosis.robust import stretches, sums_over
-from wipx.diagnosis.whiteness import whitened
+from wipx.diagnosis.whiteness import whitened_change
 from wipx.effects.remainder import KNOTS
 from wipx.sim.cache import cached
 
@@ -118,7 +118,7 @@ def _tested(
 ) -> Leftover:
     log = fitter.follower.log
     innovations = _answers(fitter.follower.linear, gains, shape, log)
-    slopes = whitened(innovations, fit.colour, log).reshape(len(shape.columns), -1).T
+    slopes = whitened_change(innovations, fit.colour, log).reshape(len(shape.columns), -1).T
     slopes = slopes - basis @ (basis.T @ slopes)
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     scaled = slopes / size

@@ -9,6 +9,7 @@ from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.sim.inputs import Inputs
 
+FORETELLING = 4  # rows from which a command is foretold
 SETTLES = 0.15  # [s] after a recording's first row, in which the state and the commands before it are unknown
 
 
@@ -74,3 +75,27 @@ class Log:
         """Standard deviation of what is noise in the commands from row to row [N or N m]."""
         fourth = [np.diff(r[name], 4) for r in self.recordings for name in self.plant.commands]
         return max(1.4826 * float(np.median(np.abs(np.concatenate(fourth)))) / np.sqrt(70.0), 1e-9)
+
+    @cached_property
+    def surprises(self) -> np.ndarray:
+        """What each command has that the rows up to its own do not foretell, shape (R, inputs, K + 1) [N or N m].
+
+        Where the log is slower than the loop, the mean command of a row answers to what the sensors showed within
+        the row: it knows of noise that, if coloured, is still there at the next row. Taken for an effect of the
+        command on the motion it would feign a delay. Empty (no inputs) where every command is in the log.
+        """
+        count = len(self.recordings)
+        if all(recording.periods == 1 for recording in self.recordings):
+            return np.zeros((count, 0, len(self.rows)))
+        inputs = self.inputs.commands.shape[1]
+        found = np.zeros((count, inputs, len(self.rows)))
+        for r, recording in enumerate(self.recordings):
+            u = recording.stack(self.plant.commands)
+            y = self.measured[: len(u), :, r][:, self.channels]
+            past = [np.roll(u, lag, axis=0) for lag in range(1, FORETELLING + 1)]
+            past += [np.roll(y, lag, axis=0) for lag in range(FORETELLING + 1)]
+            known = np.column_stack([*past, np.ones(len(u))])[FORETELLING:]
+            scaled = known / np.maximum(np.abs(known).max(axis=0), 1e-12)
+            foretold = scaled @ np.linalg.lstsq(scaled, u[FORETELLING:], rcond=1e-10)[0]
+            found[r, :, FORETELLING : len(u)] = (u[FORETELLING:] - foretold).T
+        return found / np.maximum(found.std(axis=(0, 2), keepdims=True), 1e-12)

@@ -12,6 +12,7 @@ import numpy as np
 from wipx.diagnosis.log import Log
 from wipx.sim.cache import cached
 
+SURPRISES = 2  # rows before the present whose commands may know of its noise
 LARGEST = 1e3  # standard deviations up to which an innovation is counted
 LAGS = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])  # rows
 
@@ -21,7 +22,8 @@ class Colour:
     """An autoregression of innovations.
 
     Attributes:
-        weights: From past to present, shape (len(LAGS) m, m).
+        weights: From past innovations, then from the commands' surprises (see `Log.surprises`), to the present,
+            shape (len(LAGS) m + SURPRISES inputs, m).
         whitening: Inverse Cholesky factor of what it leaves, shape (m, m).
         log_likelihood: Of the innovations that it was fitted to, up to a constant.
     """
@@ -33,7 +35,7 @@ class Colour:
 
 def colour_of(innovations: np.ndarray, log: Log) -> Colour:
     """The autoregression of innovations, shape (R, m, K + 1)."""
-    past, now = _past_and_present(innovations, log.counted, LAGS)
+    past, now = _past_and_present(innovations, log.counted, LAGS, log.surprises)
     normal = past.T @ past
     normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal) + 1e-12
     weights = np.linalg.solve(normal, past.T @ now)
@@ -48,13 +50,20 @@ def colour_of(innovations: np.ndarray, log: Log) -> Colour:
 
 def whitened(innovations: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
     """White innovations of (P, R, m, K + 1), of the same shape; zero at rows that do not count."""
-    return _whitened(innovations, log.counted, LAGS, colour.weights, colour.whitening)
+    return _whitened(innovations, log.counted, LAGS, log.surprises, colour.weights, colour.whitening)
+
+
+def whitened_change(change: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
+    """What a small change of innovations (P, R, m, K + 1) makes of the white ones; the commands do not change."""
+    none = np.zeros_like(log.surprises)
+    return _whitened(change, log.counted, LAGS, none, colour.weights, colour.whitening)
 
 
 @cached
-def _past_and_present(innovations, counted, lags):
+def _past_and_present(innovations, counted, lags, surprises):
     recordings, m, _ = innovations.shape
-    past = np.zeros((counted.sum(), len(lags) * m))
+    inputs = surprises.shape[1]
+    past = np.zeros((counted.sum(), len(lags) * m + SURPRISES * inputs))
     now = np.zeros((len(past), m))
     n = 0
     for r in range(recordings):
@@ -67,12 +76,15 @@ def _past_and_present(innovations, counted, lags):
                     if before >= 0 and counted[before, r]:
                         for c in range(m):
                             past[n, i * m + c] = innovations[r, c, before]
+                for i in range(SURPRISES):
+                    for c in range(inputs):
+                        past[n, len(lags) * m + i * inputs + c] = surprises[r, c, k - 1 - i] if k > i else 0.0
                 n += 1
     return past, now
 
 
 @cached
-def _whitened(innovations, counted, lags, weights, whitening):
+def _whitened(innovations, counted, lags, surprises, weights, whitening):
     models, recordings, m, rows = innovations.shape
     out = np.zeros((models, recordings, m, rows))
     left = np.zeros((m, rows))
@@ -80,24 +92,30 @@ def _whitened(innovations, counted, lags, weights, whitening):
         first = np.argmax(counted[:, r])  # rows that count follow each other
         last = first + counted[:, r].sum() - 1
         for p in range(models):
-            _whiten_one(innovations[p, r], lags, weights, whitening, first, last, left, out[p, r])
+            _whiten_one(innovations[p, r], lags, surprises[r], weights, whitening, first, last, left, out[p, r])
     return out
 
 
 @cached
-def _whiten_one(z, lags, weights, whitening, first, last, left, out):
+def _whiten_one(z, lags, surprises, weights, whitening, first, last, left, out):
     """One recording (m, K + 1) of one model; the innermost loops run along its rows."""
     m = len(z)
     for c in range(m):
-        for k in range(first, last + 1):
-            left[c, k] = z[c, k]
+        left[c, first : last + 1] = z[c, first : last + 1]
         for i in range(len(lags)):
             for d in range(m):
-                weight = weights[i * m + d, c]
-                for k in range(first + lags[i], last + 1):
-                    left[c, k] -= weight * z[d, k - lags[i]]
+                _subtract(left[c], z[d], weights[i * m + d, c], lags[i], first + lags[i], last)
+        for i in range(SURPRISES):
+            for d in range(len(surprises)):
+                weight = weights[len(lags) * m + i * len(surprises) + d, c]
+                _subtract(left[c], surprises[d], weight, 1 + i, max(first, 1 + i), last)
     for c in range(m):
         for d in range(c + 1):
-            weight = whitening[c, d]
-            for k in range(first, last + 1):
-                out[c, k] += weight * left[d, k]
+            _subtract(out[c], left[d], -whitening[c, d], 0, first, last)
+
+
+@cached
+def _subtract(series, other, weight, lag, first, last):
+    """Take from a series the weighted other one, `lag` rows before."""
+    for k in range(first, last + 1):
+        series[k] -= weight * other[k - lag]

@@ -34,8 +34,6 @@ class Case:
     Attributes:
         dataset: Name of the source.
         known: What the authors found missing, by "site/kind", with the figure that they give, in words.
-        files: Patterns of file names to use instead of the dataset's.
-        held_out: Files, or share of the time, that are held out instead of the dataset's choice.
         spans: Parts of recordings to use instead of the dataset's, as in `RecordingSource`.
         uncertainty: Relative standard deviation of further nominal numbers that are not exact.
         lead: Time before a prediction from which its state is estimated [s].
@@ -43,8 +41,6 @@ class Case:
 
     dataset: str
     known: dict[str, str]
-    files: tuple[str, ...] = ()
-    held_out: tuple[str, ...] = ()
     spans: dict[str, list[float | None]] = field(default_factory=dict)
     uncertainty: dict[str, float] = field(default_factory=dict)
     lead: float = 0.3
@@ -57,13 +53,7 @@ class Case:
         robot = source.robot
         if robot is not None and self.uncertainty:
             robot = {**robot, "uncertainty": {**robot.get("uncertainty", {}), **self.uncertainty}}
-        return replace(
-            source,
-            robot=robot,
-            files=list(self.files) or source.files,
-            held_out=list(self.held_out) or source.held_out,
-            spans=self.spans or source.spans,
-        )
+        return replace(source, robot=robot, spans=self.spans or source.spans)
 
 
 @dataclass(frozen=True)

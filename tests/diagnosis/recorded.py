@@ -1,0 +1,132 @@
+"""Recordings of robots whose missing physics is known, logged well or badly, and what a diagnosis makes of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from identify.emulated_robot import Effects, Robot, nominal_model
+
+from wipx.core.diagnosis import Diagnosis
+from wipx.core.model import Model
+from wipx.core.recording import Recording
+from wipx.diagnosis.case import Robot as KnownRobot
+from wipx.diagnosis.case import diagnose
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.identify.noise import sensor_noise
+from wipx.identify.parameter_space import scales_of
+from wipx.sim.analytic import AnalyticSimulator
+
+SIMULATOR = AnalyticSimulator(threads=1)
+Recordings = tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Recordings beside the nominal model, with what fits hypotheses to them.
+
+    Attributes:
+        nominal: What the owner believes.
+        recordings: Of the robot.
+        uncertainty: Relative standard deviation of nominal numbers.
+    """
+
+    nominal: Model
+    recordings: Recordings
+    uncertainty: Mapping[str, float]
+
+    @cached_property
+    def setting(self) -> Setting:
+        return Setting(self.nominal, self.uncertainty, scales_of(self.nominal, self.recordings))
+
+    @cached_property
+    def log(self) -> Log:
+        return Log.of(self.recordings, self.nominal.plant)
+
+    @cached_property
+    def fitter(self) -> Fitter:
+        return Fitter(Follower.of(SIMULATOR, self.log, self.nominal))
+
+    @cached_property
+    def quiet(self) -> NoiseLevels:
+        """The sensors' noise and hardly any noise of the forces."""
+        force = np.array([1e-4 * self.setting.scales[site].force for site in self.nominal.plant.joints])
+        return NoiseLevels(force, sensor_noise(self.recordings, self.nominal.plant))
+
+    def fit(self, *effects: str) -> Fit:
+        """These effects fitted from their usual values on."""
+        return self.fitter.polished(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), self.quiet))
+
+    def diagnosed(self) -> Diagnosis:
+        """The answer."""
+        return diagnose(self.recordings, KnownRobot(self.nominal, self.uncertainty), SIMULATOR)
+
+
+def recorded(kind: str, effects: Effects, seed: int, *, count: int = 2, duration: float = 3.0) -> Recordings:
+    """Recordings of a nominal robot with some effects that its owner does not know."""
+    robot = Robot(nominal_model(kind).with_effects(effects), duration)
+    return robot.record(np.random.default_rng(seed), count)
+
+
+def bench(kind: str, effects: Effects, seed: int, *, count: int = 2, duration: float = 3.0) -> Bench:
+    """A bench with such recordings."""
+    return Bench(nominal_model(kind), recorded(kind, effects, seed, count=count, duration=duration), {})
+
+
+def coloured(recordings: Recordings, rng: np.random.Generator) -> Recordings:
+    """With sensor noise of a memory of some ten rows beside the white one."""
+    return tuple(_changed(r, {name: r[name] + _slow_noise(r, name, rng) for name in _coordinates(r)}) for r in recordings)
+
+
+def coarse(recordings: Recordings, rng: np.random.Generator) -> Recordings:
+    """With encoders of half a millimetre and a milliradian."""
+    steps = {"x": 5e-4, "theta": 1e-3, "theta1": 1e-3, "theta2": 1e-3}
+    return tuple(
+        _changed(r, {name: np.round(r[name] / steps[name]) * steps[name] for name in _coordinates(r)})
+        for r in recordings
+    )
+
+
+def dropped(recordings: Recordings, rng: np.random.Generator) -> Recordings:
+    """With every twentieth row lost, by chance."""
+    return tuple(thinned(r, np.flatnonzero(rng.random(len(r)) > 0.05)) for r in recordings)
+
+
+def jittered(recordings: Recordings, rng: np.random.Generator) -> Recordings:
+    """Logged at every second row on average, sometimes at the next or the one before."""
+    return tuple(thinned(r, np.cumsum(rng.choice((1, 2, 2, 3), len(r) // 2 - 10))) for r in recordings)
+
+
+def slow(recordings: Recordings, rng: np.random.Generator) -> Recordings:
+    """Logged at every third row, with the mean command."""
+    return tuple(thinned(r, np.arange(0, len(r), 3)) for r in recordings)
+
+
+def thinned(recording: Recording, kept: np.ndarray) -> Recording:
+    """Some rows of a recording; the command of each is the mean of those that acted until the next."""
+    dt = np.diff(recording.t, append=2.0 * recording.t[-1] - recording.t[-2])
+    columns = {name: values[kept] for name, values in recording.columns.items()}
+    for name in ("u", "u1", "u2"):
+        if name in recording:
+            columns[name] = np.add.reduceat(recording[name] * dt, kept) / np.add.reduceat(dt, kept)
+    return Recording(recording.name, columns, recording.source, max(1, round(float(np.median(np.diff(kept))))))
+
+
+def _changed(recording: Recording, columns: Mapping[str, np.ndarray]) -> Recording:
+    return Recording(recording.name, {**recording.columns, **columns}, recording.source, recording.periods)
+
+
+def _coordinates(recording: Recording) -> list[str]:
+    return [name for name in ("x", "theta", "theta1", "theta2") if name in recording]
+
+
+def _slow_noise(recording: Recording, name: str, rng: np.random.Generator) -> np.ndarray:
+    size = 1e-4 if name == "x" else 4e-4
+    noise = np.zeros(len(recording))
+    for k, kick in enumerate(rng.normal(size=len(recording)) * size * np.sqrt(1.0 - 0.9**2)):
+        noise[k] = 0.9 * noise[k - 1] + kick
+    return noise

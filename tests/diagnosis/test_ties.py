@@ -1,0 +1,58 @@
+"""What recordings cannot tell apart is said to be a tie, and nothing else is."""
+
+import pytest
+from diagnosis.recorded import bench
+
+from wipx.core.diagnosis import FoundEffect
+from wipx.identify.evaluation import Judge
+
+
+def found(kind: str, effects: dict[str, dict[str, float]], seed: int) -> FoundEffect:
+    answer = bench(kind, effects, seed).diagnosed()
+    (effect,) = answer.effects
+    return effect
+
+
+@pytest.mark.parametrize(
+    "hidden", [{"geometry/com_offset": {"theta_eq": 0.01}}, {"sensor_theta/bias": {"b": 0.01}}], ids=["body", "sensor"]
+)
+def test_a_biased_sensor_is_a_shifted_centre_of_mass(hidden: dict, fresh_seed: int):
+    effect = found("wip", hidden, fresh_seed)
+    assert {effect.name, *effect.equivalent} == {"geometry/com_offset", "sensor_theta/bias"}
+    assert effect.present_probability == pytest.approx(0.5, abs=0.05)
+    rival = effect.rivals[0]
+    assert rival.separation < 1.0
+    assert abs(effect.parameters[0].value) == pytest.approx(0.01, rel=0.1)
+    assert abs(next(iter(rival.parameters.values()))) == pytest.approx(0.01, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        {"translation/coulomb": {"F_c": 0.5}},
+        {"actuator/delay": {"tau": 0.008}},
+        {"environment/rail_tilt": {"angle": 0.01}},
+    ],
+    ids=["friction", "delay", "tilt"],
+)
+def test_what_differs_is_no_tie(hidden: dict, fresh_seed: int):
+    effect = found("wip", hidden, fresh_seed)
+    assert effect.name in hidden
+    assert effect.equivalent == ()
+    assert effect.present_probability > 0.99
+
+
+def test_a_tie_is_told_to_the_reader_with_the_experiment_that_would_not_settle_it():
+    answer = bench("wip", {"geometry/com_offset": {"theta_eq": 0.01}}, seed=7).diagnosed()
+    (effect,) = answer.effects
+    (other,) = effect.equivalent
+    assert f"{effect.name} cannot be told from {other}" in answer.weak
+    assert answer.next_experiment is None  # no excitation can
+
+
+def test_tied_effects_predict_the_same():
+    case = bench("wip", {"geometry/com_offset": {"theta_eq": 0.01}}, seed=7)
+    models = [case.fit(name).hypothesis.model for name in ("geometry/com_offset", "sensor_theta/bias")]
+    judge = Judge(case.fitter.follower.simulator, case.quiet.sensor, 0.5, 0.3)
+    for one, other in zip(*(judge.predict(model, case.recordings) for model in models), strict=True):
+        assert abs(one - other)[~(one != one)].max() < 1e-5
