@@ -26,6 +26,7 @@ SINGLE: dict[str, tuple[str, Effects]] = {
     "unactuated": ("cartpole", {"pitch/coulomb": {"F_c": 0.01}}),
     "elbow": ("double_pendulum", {"joint2/viscous": {"sigma": 0.05}}),
 }
+QUICK = {"damping", "dead zone", "delay", "spring", "drag", "Stribeck", "elbow"}  # of `SINGLE`, one of each family
 SIMPLE: dict[str, tuple[str, Effects]] = {
     "wip": ("wip", {"translation/coulomb": {"F_c": 0.5}}),
     "pendulum": ("pendulum", {"pitch/coulomb": {"F_c": 0.03}}),
@@ -75,7 +76,7 @@ def test_a_poor_log_is_no_physics(log: str, kind: str, fresh_seed: int):
     assert (answer.verdict, answer.effects) == ("consistent", ())
 
 
-@pytest.mark.parametrize("name", SINGLE)
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SINGLE])
 def test_one_effect_is_named_with_its_size(name: str, fresh_seed: int):
     kind, truth = SINGLE[name]
     answer = bench(kind, truth, fresh_seed).diagnosed()
@@ -105,6 +106,7 @@ def test_the_simplest_law_is_preferred(name: str, fresh_seed: int):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAIRS)
 def test_two_effects_are_both_named(name: str, fresh_seed: int):
     kind, truth = PAIRS[name]

@@ -124,9 +124,10 @@ def _tested(
     scaled = slopes / size
     normal = scaled.T @ scaled + RIDGE * np.eye(len(size))
     score = scaled.T @ left
-    gain = 0.5 * float(score @ np.linalg.solve(normal, score))
-    parts = sums_over(labels, scaled * left[:, None])
-    # By how much scores vary more from stretch to stretch than white innovations would have it.
+    force = np.linalg.solve(normal, score)
+    gain = 0.5 * float(score @ force)
+    # By how much scores vary more from stretch to stretch than white innovations would have it, the force allowed for.
+    parts = sums_over(labels, scaled * (left - scaled @ force)[:, None])
     inflation = max(1.0, float(np.mean(np.sum(parts**2, axis=0))))
     degrees = int(np.linalg.matrix_rank(normal, tol=1e-6))
     p_value = stats.chi2.sf(2.0 * gain / inflation, degrees)
