@@ -3,9 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
-from identify.emulated_robot import Effects, Robot, nominal_model
+import yaml
+from identify.emulated_robot import BODIES, RATE, Effects, Robot, controller, nominal_model
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
@@ -79,7 +81,9 @@ def bench(kind: str, effects: Effects, seed: int, *, count: int = 2, duration: f
 
 def coloured(recordings: Recordings, rng: np.random.Generator) -> Recordings:
     """With sensor noise of a memory of some ten rows beside the white one."""
-    return tuple(_changed(r, {name: r[name] + _slow_noise(r, name, rng) for name in _coordinates(r)}) for r in recordings)
+    return tuple(
+        _changed(r, {name: r[name] + _slow_noise(r, name, rng) for name in _coordinates(r)}) for r in recordings
+    )
 
 
 def coarse(recordings: Recordings, rng: np.random.Generator) -> Recordings:
@@ -130,3 +134,21 @@ def _slow_noise(recording: Recording, name: str, rng: np.random.Generator) -> np
     for k, kick in enumerate(rng.normal(size=len(recording)) * size * np.sqrt(1.0 - 0.9**2)):
         noise[k] = 0.9 * noise[k - 1] + kick
     return noise
+
+
+def write_folder(folder: Path, kind: str, recordings: Recordings, columns: tuple[str, ...]) -> Path:
+    """A folder as contract section 1 has it."""
+    folder.mkdir()
+    gains = controller(kind).gains.ravel().tolist()
+    described = {
+        "plant": kind,
+        "parameters": BODIES[kind],
+        "controller": {"kind": "lqr", "gains": gains, "rate": RATE},
+    }
+    (folder / "robot.yaml").write_text(yaml.safe_dump(described))
+    for recording in recordings:
+        header = ",".join(columns)
+        np.savetxt(
+            folder / recording.name, recording.stack(columns), fmt="%.10g", delimiter=",", header=header, comments=""
+        )
+    return folder

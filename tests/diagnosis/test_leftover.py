@@ -16,9 +16,7 @@ WAVES = np.array([0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])  # of no law: 
 def strange_force(size: float) -> dict[str, dict[str, float]]:
     """A force on the carriage over its speed."""
     forces = {f"f{i}": float(size * f) for i, f in enumerate(WAVES)}
-    return {
-        "translation/remainder": {"signal": RATE_OF_CARRIAGE, "factor": 0.0, "low": -0.8, "high": 0.8, **forces}
-    }
+    return {"translation/remainder": {"signal": RATE_OF_CARRIAGE, "factor": 0.0, "low": -0.8, "high": 0.8, **forces}}
 
 
 @pytest.mark.parametrize("kind", ["wip", "linear_axis"])

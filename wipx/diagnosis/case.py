@@ -49,10 +49,26 @@ NINETY_FIVE = 1.96  # standard deviations
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
+DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
+FAR_OFF = 5.0  # times the noise floor, errors from which effects beyond the vocabulary are tried in any case
+CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+SHORTEST_HALVED = 2.0  # [s]
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 Watcher = Callable[[str, float], None]
+
+
+def in_two(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    """Recordings as they are; one alone in two halves, each of which can be held out from the other."""
+    if len(recordings) != 1 or recordings[0].duration < SHORTEST_HALVED:
+        return recordings
+    whole = recordings[0]
+    middle = len(whole) // 2
+    return (
+        replace(whole.rows(0, middle), name=f"{whole.name}, first half"),
+        replace(whole.rows(middle, len(whole)), name=f"{whole.name}, second half"),
+    )
 
 
 def unwatched(stage: str, share: float) -> None:
@@ -102,14 +118,15 @@ def diagnose(
     """
     begun = time.perf_counter()
     check_long_enough(recordings)
-    case = _Case.of(recordings, robot, simulator, lead)
+    case = _Case.of(in_two(recordings), robot, simulator, lead)
     watcher("noise of the nominal model", 0.02)
     start = Hypothesis.of(case.setting, (), {})
     nominal = case.fitter.polished(case.fitter.fit(start, case.first_levels))
     selection = Selection(case.fitter, case.setting, nominal)
     watcher("looking for missing effects", 0.1)
     first = selection.extensions(nominal)
-    check_plausible(case.fitter, case.setting, selection.nominal, first[0] if first else nominal, source)
+    if case.is_driven:
+        check_plausible(case.fitter, case.setting, selection.nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     chosen = selection.run()
     watcher("what is left over", 0.6)
@@ -163,6 +180,11 @@ class _Case:
         """The recordings."""
         return self.fitter.follower.log
 
+    @property
+    def is_driven(self) -> bool:
+        """Whether any command ever changes."""
+        return bool(np.ptp(self.log.inputs.commands, axis=0).max() > 0.0)
+
     def confirmed(self, selection: Selection, fit: Fit) -> Fit:
         """Without effects that change no prediction to speak of, or do not transfer to held-out recordings."""
         if not fit.effects:
@@ -176,9 +198,10 @@ class _Case:
             change = np.concatenate(with_it) - np.concatenate(without)
             irrelevant = bool(np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * self.judge.noise))
             known = row_likelihoods(self.fitter, reduced, reduced.white).sum(axis=1)
-            transferred = float(np.sum(repeated.likelihoods - known))
-            if irrelevant or transferred <= 0.0:
-                gain = fit.log_likelihood - reduced.log_likelihood
+            gain = fit.log_likelihood - reduced.log_likelihood
+            # An effect that gains much and does not transfer points to something else that is missing.
+            lost = float(np.sum(repeated.likelihoods - known)) <= 0.0 and gain < DOUBTFUL
+            if irrelevant or lost:
                 reason = (
                     "changes no prediction to speak of" if irrelevant else "does not transfer to held-out recordings"
                 )
@@ -193,15 +216,33 @@ class _Case:
         p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
         explained = fit.log_likelihood - selection.nominal.log_likelihood
         worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained)
-        if p_value > SIGNIFICANT or strongest.gain < worth:
+        significant = p_value < SIGNIFICANT and strongest.gain >= worth
+        if not significant and not self._is_far_off(fit):
             return _Rest(fit, None, p_value, False, (), np.zeros(0))
         resembles, named = self._beyond(selection, fit, worth)
+        if not significant:
+            return _Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
         forces = [leftover for leftover in found if leftover.shape.kind != "resonance"]
         widest = max(forces, key=lambda leftover: leftover.gain)
         stood_in, spread = with_curve(self.fitter, self.setting, fit, widest)
         if named is not None and named.log_likelihood > stood_in.log_likelihood:
+            named = self._without_superfluous(selection, named)
             return _Rest(named, strongest, p_value, True, resembles, np.zeros(0))
         return _Rest(stood_in, widest, p_value, True, resembles, spread)
+
+    def _is_far_off(self, fit: Fit) -> bool:
+        """Whether predictions are much worse than sensor noise makes them."""
+        errors, _ = self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)
+        return any(errors.completed[name] > FAR_OFF * floor for name, floor in errors.noise_floor.items())
+
+    def _without_superfluous(self, selection: Selection, fit: Fit) -> Fit:
+        """Without effects that one from beyond the vocabulary has made superfluous."""
+        for effect in fit.effects[:-1]:
+            rest = tuple(e for e in fit.effects if e != effect)
+            smaller = selection.fitted(rest, fit)
+            if not selection.worthwhile(smaller, fit):
+                return self._without_superfluous(selection, smaller)
+        return fit
 
     def _beyond(self, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
         """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
@@ -223,7 +264,7 @@ class _Case:
         nominal, fit = self.setting.nominal, rest.fit
         repeated = transfer(self.fitter, fit)
         held_out, traces = judged(self.judge, nominal, repeated.models, self.recordings)
-        fitted, fit_traces = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
+        fitted, _ = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
         ends = self._estimates(fit)
         effects = self._effects(selection, rest, repeated, ends, shapes)
         verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
@@ -247,7 +288,7 @@ class _Case:
             bounds=self._bounds(selection, fit),
             weak=self._weak(effects),
             next_experiment=None,
-            traces=(*traces, *fit_traces) if len(self.recordings) == 1 else traces,
+            traces=traces,
             notes=(),
             seconds=0.0,
         )
@@ -372,6 +413,9 @@ class _Case:
             name = next(iter(set(other.effects) - rest), effect)
             if name == effect or _is_richer(other, effect, self.log):
                 continue
+            if fit.log_likelihood - other.log_likelihood < CLOSE_CALL:
+                again = self.fitter.polished(self.fitter.fit(other.hypothesis, fit.levels))
+                other = max(other, again, key=lambda found: found.log_likelihood)
             loss = fit.log_likelihood - other.log_likelihood
             values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
             rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
@@ -380,6 +424,10 @@ class _Case:
         return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 
     def _unexplained(self, rest: _Rest) -> Unexplained:
+        beyond = [name for name in rest.fit.effects if effect_of(name, self.log.plant).beyond]
+        if rest.significant and beyond:
+            words = " and ".join(effect_in_words(name, self.log.plant.kind) for name in beyond)
+            return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
         if not rest.significant or rest.strongest is None:
             return Unexplained(False, rest.p_value, None, "", (), None)
         shape = rest.strongest.shape
@@ -455,6 +503,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         return "The nominal model explains the recordings up to noise: nothing is missing."
     if diagnosis.verdict == "mismatch":
         return f"{named} {share:.0%} of the mismatch."
+    if any(effect.beyond for effect in diagnosis.effects):
+        return f"{named} {share:.0%} of the mismatch; the vocabulary has no name for {diagnosis.unexplained.shape}."
     shape = diagnosis.unexplained.shape
     rest = f"{shape[:1].upper()}{shape[1:]} that no effect of the vocabulary explains"
     return f"{rest} is left over." if not parts else f"{named} a part of the mismatch. {rest} is left over."

@@ -110,6 +110,8 @@ def _interval(name: str, values: np.ndarray, excess: np.ndarray) -> tuple[float,
     if total <= 0.0:
         return None
     edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, 41)))
+    if len(edges) < 2:
+        return None
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     held = np.bincount(place, weights=excess, minlength=len(edges) - 1) / total
     rows = np.bincount(place, minlength=len(edges) - 1) / len(values)
