@@ -3,9 +3,10 @@ PYTHON ?= python3
 PY := .venv/bin/python
 READY := .venv/.ready
 RECORDINGS ?=
+CASES ?= 120
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real diagnose-real test test-slow check bench lock clean
+.PHONY: help setup demo real diagnose-real concealed test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -20,8 +21,8 @@ $(READY): requirements.lock pyproject.toml
 	$(PY) -m pip install --quiet --no-deps --editable .
 	@touch $@
 
-demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder identifies that robot instead
-	$(PY) -m wipx $(if $(RECORDINGS),task=identify "recordings.path='$(RECORDINGS)'",task=pipeline)
+demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder diagnoses that robot instead
+	$(PY) -m wipx $(if $(RECORDINGS),task=diagnose "recordings.path='$(RECORDINGS)'",task=pipeline)
 
 real: $(READY)  ## identify public recordings of real robots: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx task=real_recordings task.page=docs/real_recordings.md hydra.run.dir=runs/real
@@ -29,6 +30,9 @@ real: $(READY)  ## identify public recordings of real robots: the table of docs/
 
 diagnose-real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_diagnosis.md
 	$(PY) -m wipx task=real_diagnosis task.page=docs/real_diagnosis.md hydra.run.dir=runs/real_diagnosis
+
+concealed: $(READY)  ## diagnose 120 fresh robots with concealed physics (CASES=...): the table of docs/blind_results.md
+	$(PY) -m wipx task=concealed task.cases=$(CASES) task.page=docs/blind_results.md
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -m "not slow"

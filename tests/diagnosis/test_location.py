@@ -8,9 +8,9 @@ from wipx.core.model import ModelBatch
 from wipx.diagnosis.location import excess_of
 
 
-def test_shares_of_sites_sum_to_one(fresh_seed: int):
+def test_shares_of_sites_sum_to_one():
     hidden = {"translation/viscous": {"sigma": 2.0}, "actuator/delay": {"tau": 0.006}}
-    sites = bench("wip", hidden, fresh_seed).diagnosed().location.sites
+    sites = bench("wip", hidden, seed=21).diagnosed().location.sites
     assert set(sites) == {"translation", "actuator"}
     assert sum(sites.values()) == pytest.approx(1.0)
     assert all(share > 0.0 for share in sites.values())

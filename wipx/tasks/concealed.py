@@ -25,7 +25,7 @@ from wipx.concealed.table import confusions, markdown, misses, tier_scores
 from wipx.concealed.write import TRUTH, write_numbered
 from wipx.core.errors import InputError, unknown_name
 from wipx.tasks.job import Job
-from wipx.tasks.results import write_json, written_together
+from wipx.tasks.results import replace_table, write_json, written_together
 
 RESULT, SEED = "result.json", "seed.json"
 
@@ -44,6 +44,7 @@ class Concealed:
         workers: Processes that draw and diagnose.
         tiers: Tiers to draw from; empty for all.
         time_limit: For one diagnosis [s].
+        page: Markdown page whose table is renewed; None for none.
     """
 
     cases: int = 40
@@ -51,6 +52,7 @@ class Concealed:
     workers: int = 2
     tiers: tuple[str, ...] = ()
     time_limit: float = 900.0
+    page: str | None = None
 
     def __post_init__(self) -> None:
         for name, value in (("task.cases", self.cases), ("task.workers", self.workers)):
@@ -71,6 +73,8 @@ class Concealed:
             (folder / "score.csv").write_text(_csv(scores), encoding="utf-8")
             write_json(folder / "score.json", _summary(seed, scores))
             draw_confusions(confusions(scores), folder / "confusions.png")
+        if self.page is not None:
+            replace_table(Path(self.page), text)
         print(f"\n{text}\nwritten to {job.out}")
 
     def _seed(self, out: Path) -> int:

@@ -23,8 +23,7 @@ from wipx.report.diagnosis_words import value_in_words
 from wipx.report.numbers import compact
 from wipx.tasks.diagnose import Diagnose
 from wipx.tasks.job import Job
-from wipx.tasks.real_recordings import BEGIN, END
-from wipx.tasks.results import write_json, written_together
+from wipx.tasks.results import replace_table, write_json, written_together
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class RealDiagnosis:
         table = "\n".join([*HEAD, *rows]) + "\n"
         (job.out / "table.md").write_text(table, encoding="utf-8")
         if self.page is not None:
-            _replace_table(Path(self.page), table)
+            replace_table(Path(self.page), table)
         print(f"\n{table}\ntable: {job.out / 'table.md'}")
 
     def _source(self, job: Job, dataset: str) -> RecordingSource:
@@ -189,10 +188,3 @@ def _shown_errors(errors: FitErrors, units: Mapping[str, str]) -> str:
         f"{column} {' -> '.join(compact(model[column], 3) for model in models)} {units[column]}"
         for column in errors.nominal
     )
-
-
-def _replace_table(page: Path, table: str) -> None:
-    text = page.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    page.write_text(f"{head}{BEGIN}\n{table}{END}{tail}", encoding="utf-8")

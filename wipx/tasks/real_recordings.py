@@ -16,8 +16,7 @@ from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import compact, with_interval
 from wipx.tasks.identify import Identify
 from wipx.tasks.job import Job
-
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
+from wipx.tasks.results import replace_table
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ class RealRecordings:
         table = "\n".join([*_HEAD, *rows]) + "\n"
         (job.out / "table.md").write_text(table, encoding="utf-8")
         if self.page is not None:
-            _replace_table(Path(self.page), table)
+            replace_table(Path(self.page), table)
         print(f"\n{table}\ntable: {job.out / 'table.md'}")
 
     def _identify(self, job: Job, name: str, case: Case, source: RecordingSource) -> IdentificationResult:
@@ -118,10 +117,3 @@ def _row(case: Case, result: IdentificationResult) -> str:
 def _shown(estimate: Estimate) -> str:
     rounded = with_interval(estimate.value, estimate.low, estimate.high)
     return f"{estimate.name} = {rounded.value} {rounded.ends} {estimate.unit}"
-
-
-def _replace_table(page: Path, table: str) -> None:
-    text = page.read_text(encoding="utf-8")
-    head, _, rest = text.partition(BEGIN)
-    _, _, tail = rest.partition(END)
-    page.write_text(f"{head}{BEGIN}\n{table}{END}{tail}", encoding="utf-8")

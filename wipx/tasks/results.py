@@ -11,6 +11,22 @@ import numpy as np
 
 from wipx.core.errors import InputError
 
+BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->"
+
+
+def replace_table(page: Path, table: str) -> None:
+    """Replace what stands between the marks of a table in a Markdown page.
+
+    Raises:
+        InputError: the page or its marks are missing.
+    """
+    text = page.read_text(encoding="utf-8") if page.is_file() else ""
+    head, begin, rest = text.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not (begin and end):
+        raise InputError(f"{page}: no table to replace, expected a page with lines {BEGIN.strip()} and {END}")
+    page.write_text(f"{head}{BEGIN}{table.rstrip()}\n{END}{tail}", encoding="utf-8")
+
 
 @contextmanager
 def written_together(out: Path) -> Iterator[Path]:
