@@ -54,6 +54,7 @@ FAR_OFF = 5.0  # times the noise floor, errors from which effects beyond the voc
 CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 SHORTEST_HALVED = 2.0  # [s]
+LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 Watcher = Callable[[str, float], None]
@@ -265,7 +266,7 @@ class _Case:
         repeated = transfer(self.fitter, fit)
         held_out, traces = judged(self.judge, nominal, repeated.models, self.recordings)
         fitted, _ = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
-        ends = self._estimates(fit)
+        ends = self._estimates(fit, selection.nominal)
         effects = self._effects(selection, rest, repeated, ends, shapes)
         verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
         unexplained = self._unexplained(rest)
@@ -323,10 +324,13 @@ class _Case:
         plant = self.log.plant
         return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
 
-    def _estimates(self, fit: Fit) -> tuple[Estimate, ...]:
+    def _estimates(self, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
         """Every number of a fit with its 95 % interval."""
         space, cube = fit.hypothesis.space, fit.hypothesis.cube
-        deviation = np.sqrt(np.diag(covariance(fit, self.log))) if len(cube) else np.zeros(0)
+        explained = max(fit.log_likelihood - nominal.log_likelihood, 0.0)
+        # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
+        wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
+        deviation = wider * np.sqrt(np.diag(covariance(fit, self.log))) if len(cube) else np.zeros(0)
         values = space.to_values(cube)
         low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
         high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
