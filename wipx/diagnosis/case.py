@@ -55,6 +55,7 @@ CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the a
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 SHORTEST_HALVED = 2.0  # [s]
 LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
+UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 Watcher = Callable[[str, float], None]
@@ -334,18 +335,21 @@ class _Case:
         values = space.to_values(cube)
         low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
         high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
+        # A number without any influence may be anything.
+        blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
         return tuple(
             Estimate(
                 p.name,
                 p.unit,
                 p.neutral,
-                float(values[i]),
-                float(low[i]),
-                float(high[i]),
+                float(values[i]) - turns,
+                (p.low if blind[i] else float(low[i])) - turns,
+                (p.high if blind[i] else float(high[i])) - turns,
                 bool(cube[i] <= 0.0 or cube[i] >= 1.0),
                 _meaning(space.model, p.name),
             )
             for i, p in enumerate(space.free)
+            for turns in [_whole_turns(p.name, float(values[i]))]
         )
 
     def _effects(
@@ -476,6 +480,11 @@ def is_wide(p: Estimate) -> bool:
     return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
 
 
+def _whole_turns(name: str, value: float) -> float:
+    """The whole turns in a phase [rad]; nothing for other numbers."""
+    return 2.0 * np.pi * round(value / (2.0 * np.pi)) if name.endswith(".phase") else 0.0
+
+
 def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
     """Standard deviation of a recorded rate's noise, by second differences."""
     values = np.concatenate([np.diff(r[column], 2) for r in recordings])
@@ -503,6 +512,11 @@ def sentence(diagnosis: Diagnosis) -> str:
     listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
     verb = "was" if len(parts) == 1 else "were"
     named = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {'it' if len(parts) == 1 else 'them'} explains"
+    if diagnosis.verdict == "consistent" and (ratio := _times_the_floor(diagnosis)) > FAR_OFF:
+        return (
+            "No missing effect shows itself from row to row, but predictions over "
+            f"{diagnosis.held_out.horizon:g} s are {ratio:.0f} times worse than sensor noise makes them: record other excitations."
+        )
     if diagnosis.verdict == "consistent":
         return "The nominal model explains the recordings up to noise: nothing is missing."
     if diagnosis.verdict == "mismatch":
@@ -523,6 +537,12 @@ def explained_share(diagnosis: Diagnosis) -> float:
         total += max(errors.nominal[name] ** 2 - floor**2, 0.0) / scale
         removed += max(errors.nominal[name] ** 2 - max(errors.completed[name] ** 2, floor**2), 0.0) / scale
     return removed / total if total > 0.0 else 0.0
+
+
+def _times_the_floor(diagnosis: Diagnosis) -> float:
+    """The largest held-out error over its noise floor."""
+    errors = diagnosis.held_out
+    return max(errors.completed[name] / max(floor, 1e-15) for name, floor in errors.noise_floor.items())
 
 
 def _with_size(effect: FoundEffect, kind: str) -> str:

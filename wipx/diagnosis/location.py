@@ -56,7 +56,7 @@ def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, f
     if rest is not None and not sites:
         sites[rest] = 1.0
     total = sum(sites.values())
-    return {site: share / total for site, share in sorted(sites.items(), key=lambda item: -item[1])}
+    return {site: float(share / total) for site, share in sorted(sites.items(), key=lambda item: -item[1])}
 
 
 def _named_regions(

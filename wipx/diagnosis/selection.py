@@ -26,6 +26,8 @@ STARTS = 2  # of each effect
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 POLISHED = 3  # effects for which they are, at most
 WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
+PAIRED = 2  # effects that were not worth it alone, for which a second is sought
+WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
 
 
@@ -58,7 +60,14 @@ class Selection:
                 current = self.caught_up(current, best)
             if best is None or not self.worthwhile(current, best):
                 self._remember(current, extended, None)
-                break
+                best = self._pair(current, extended)
+                if best is None:
+                    break
+                added = [effect for effect in best.effects if effect not in current.effects]
+                gain = best.log_likelihood - current.log_likelihood
+                self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
+                current = self.pruned(best)
+                continue
             self._remember(current, extended, best)
             current = self.pruned(best)
         return self.exchanged(current)
@@ -84,6 +93,17 @@ class Selection:
         if key not in self._extensions:
             self._extensions[key] = self._extended(fit)
         return self._extensions[key]
+
+    def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
+        """The fit with two effects more of which neither is worth it alone, if the two are."""
+        if len(current.effects) + 2 > MOST_EFFECTS:
+            return None
+        for one in extended[:PAIRED]:
+            if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
+                two = self.preferred(self.extensions(one))
+                if two is not None and self.worthwhile(current, two):
+                    return two
+        return None
 
     def prospects_of(self, fit: Fit) -> list[Prospect]:
         """Where to start for every effect that could be added, the best first."""

@@ -18,7 +18,7 @@ EFFECT = Effect(
             6.0,
             grid=tuple(float(n) for n in range(2, 41)),
         ),
-        Parameter("phase", "angle of the first crest", "angle", 0.0, -3.2, 3.2, 0.0, grid=(0.0, 1.57, 3.14, -1.57)),
+        Parameter("phase", "angle of the first crest", "angle", 0.0, -6.3, 6.3, 0.0, grid=(0.0, 1.57, 3.14, -1.57)),
     ),
     law="+ A cos(n x/r + phase)",
     linear_in=("A",),
