@@ -8,7 +8,6 @@ import numpy as np
 
 from wipx.core.diagnosis import (
     Alternative,
-    Bound,
     Candidate,
     Diagnosis,
     FoundEffect,
@@ -30,11 +29,13 @@ from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.location import located
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.nested import simpler
+from wipx.diagnosis.numbers import bounds, estimates, is_wide
 from wipx.diagnosis.observer import NoiseLevels
-from wipx.diagnosis.robust import covariance, inflation
+from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.sanity import check_plausible
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.sentence import FAR_OFF, sentence
 from wipx.diagnosis.stand_in import curve_of, with_curve
 from wipx.effects.catalogue import effect_of
 from wipx.identify.evaluation import Judge
@@ -45,18 +46,13 @@ from wipx.sim.analytic import AnalyticSimulator, StateFeedback
 
 HORIZON = 0.5  # [s] of predictions, contract section 4
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
-NINETY_FIVE = 1.96  # standard deviations
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
-FAR_OFF = 5.0  # times the noise floor, errors from which effects beyond the vocabulary are tried in any case
 CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 SHORTEST_HALVED = 2.0  # [s]
-LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
-UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
-WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 Watcher = Callable[[str, float], None]
 
@@ -267,7 +263,7 @@ class _Case:
         repeated = transfer(self.fitter, fit)
         held_out, traces = judged(self.judge, nominal, repeated.models, self.recordings)
         fitted, _ = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
-        ends = self._estimates(fit, selection.nominal)
+        ends = estimates(fit, selection.nominal, self.log)
         effects = self._effects(selection, rest, repeated, ends, shapes)
         verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
         unexplained = self._unexplained(rest)
@@ -287,7 +283,7 @@ class _Case:
             held_out=held_out,
             unexplained=unexplained,
             candidates=tuple(selection.considered),
-            bounds=self._bounds(selection, fit),
+            bounds=bounds(selection.prospects_of(fit), self.log.plant),
             weak=self._weak(effects),
             next_experiment=None,
             traces=traces,
@@ -324,33 +320,6 @@ class _Case:
     def _units(self) -> dict[str, str]:
         plant = self.log.plant
         return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
-
-    def _estimates(self, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
-        """Every number of a fit with its 95 % interval."""
-        space, cube = fit.hypothesis.space, fit.hypothesis.cube
-        explained = max(fit.log_likelihood - nominal.log_likelihood, 0.0)
-        # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
-        wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
-        deviation = wider * np.sqrt(np.diag(covariance(fit, self.log))) if len(cube) else np.zeros(0)
-        values = space.to_values(cube)
-        low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
-        high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
-        # A number without any influence may be anything.
-        blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
-        return tuple(
-            Estimate(
-                p.name,
-                p.unit,
-                p.neutral,
-                float(values[i]) - turns,
-                (p.low if blind[i] else float(low[i])) - turns,
-                (p.high if blind[i] else float(high[i])) - turns,
-                bool(cube[i] <= 0.0 or cube[i] >= 1.0),
-                _meaning(space.model, p.name),
-            )
-            for i, p in enumerate(space.free)
-            for turns in [_whole_turns(p.name, float(values[i]))]
-        )
 
     def _effects(
         self,
@@ -448,22 +417,6 @@ class _Case:
         curve = curve_of(shape, rest.fit, rest.spread, self.log) if len(rest.spread) else None
         return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
 
-    def _bounds(self, selection: Selection, fit: Fit) -> tuple[Bound, ...]:
-        """How large effects that were not found could be: from the sharpest look at each."""
-        sharpest: dict[str, tuple[float, Bound]] = {}
-        for prospect in selection.prospects_of(fit):
-            first, value = next(iter(prospect.values.items()))
-            if not np.isfinite(prospect.deviation):
-                continue
-            spec = effect_of(prospect.effect, self.log.plant).parameters[0]
-            unit = spec.unit(angular=self.log.plant.is_angular(prospect.effect.partition("/")[0]))
-            reach = NINETY_FIVE * prospect.deviation
-            low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
-            known = sharpest.get(prospect.effect)
-            if known is None or prospect.deviation < known[0]:
-                sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, value + reach, unit))
-        return tuple(bound for _, bound in sharpest.values())
-
     def _weak(self, effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
         found = []
         for effect in effects:
@@ -473,16 +426,6 @@ class _Case:
             for name in effect.equivalent:
                 found.append(f"{effect.name} cannot be told from {name}")
         return tuple(found)
-
-
-def is_wide(p: Estimate) -> bool:
-    """Whether the interval of a number is wide beside the number itself."""
-    return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
-
-
-def _whole_turns(name: str, value: float) -> float:
-    """The whole turns in a phase [rad]; nothing for other numbers."""
-    return 2.0 * np.pi * round(value / (2.0 * np.pi)) if name.endswith(".phase") else 0.0
 
 
 def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
@@ -495,61 +438,3 @@ def _is_richer(other: Fit, effect: str, log: Log) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
     replaced = simpler(other, log)
     return replaced is not None and effect in replaced
-
-
-def _meaning(model: Model, name: str) -> str:
-    effect, _, symbol = name.rpartition(".")
-    if not effect:
-        return model.plant.parameters[symbol].meaning
-    return next(p.meaning for p in effect_of(effect, model.plant).parameters if p.name == symbol)
-
-
-def sentence(diagnosis: Diagnosis) -> str:
-    """The answer in one sentence or two."""
-    kind = diagnosis.nominal.plant.kind
-    share = explained_share(diagnosis)
-    parts = [_with_size(effect, kind) for effect in diagnosis.effects]
-    listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
-    verb = "was" if len(parts) == 1 else "were"
-    named = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {'it' if len(parts) == 1 else 'them'} explains"
-    if diagnosis.verdict == "consistent" and (ratio := _times_the_floor(diagnosis)) > FAR_OFF:
-        return (
-            "No missing effect shows itself from row to row, but predictions over "
-            f"{diagnosis.held_out.horizon:g} s are {ratio:.0f} times worse than sensor noise makes them: record other excitations."
-        )
-    if diagnosis.verdict == "consistent":
-        return "The nominal model explains the recordings up to noise: nothing is missing."
-    if diagnosis.verdict == "mismatch":
-        return f"{named} {share:.0%} of the mismatch."
-    if any(effect.beyond for effect in diagnosis.effects):
-        return f"{named} {share:.0%} of the mismatch; the vocabulary has no name for {diagnosis.unexplained.shape}."
-    shape = diagnosis.unexplained.shape
-    rest = f"{shape[:1].upper()}{shape[1:]} that no effect of the vocabulary explains"
-    return f"{rest} is left over." if not parts else f"{named} a part of the mismatch. {rest} is left over."
-
-
-def explained_share(diagnosis: Diagnosis) -> float:
-    """Share of the explainable squared prediction error on held-out recordings that the completed model removes."""
-    errors = diagnosis.held_out
-    removed = total = 0.0
-    for name, floor in errors.noise_floor.items():
-        scale = max(floor, 1e-12) ** 2
-        total += max(errors.nominal[name] ** 2 - floor**2, 0.0) / scale
-        removed += max(errors.nominal[name] ** 2 - max(errors.completed[name] ** 2, floor**2), 0.0) / scale
-    return removed / total if total > 0.0 else 0.0
-
-
-def _times_the_floor(diagnosis: Diagnosis) -> float:
-    """The largest held-out error over its noise floor."""
-    errors = diagnosis.held_out
-    return max(errors.completed[name] / max(floor, 1e-15) for name, floor in errors.noise_floor.items())
-
-
-def _with_size(effect: FoundEffect, kind: str) -> str:
-    """An effect in words with its first number."""
-    words = effect_in_words(effect.name, kind)
-    if not effect.parameters:
-        return words
-    first = effect.parameters[0]
-    unit = "" if first.unit == "1" else f" {first.unit}"
-    return f"{words} ({first.name.rpartition('.')[2]} = {first.value:.3g}{unit})"

@@ -1,0 +1,80 @@
+"""Numbers of a diagnosis: estimates with 95 % intervals, and bounds of what was not found."""
+
+import numpy as np
+
+from wipx.core.diagnosis import Bound
+from wipx.core.model import Model
+from wipx.core.plant import Plant
+from wipx.core.results import Estimate
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.robust import covariance
+from wipx.diagnosis.screening import Prospect
+from wipx.effects.catalogue import effect_of
+
+NINETY_FIVE = 1.96  # standard deviations
+LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
+UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
+WIDE = 0.3  # relative half width of an interval from which a number is called weak
+
+
+def estimates(fit: Fit, nominal: Fit, log: Log) -> tuple[Estimate, ...]:
+    """Every number of a fit with its 95 % interval."""
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    explained = max(fit.log_likelihood - nominal.log_likelihood, 0.0)
+    # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
+    wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
+    deviation = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
+    values = space.to_values(cube)
+    low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
+    high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
+    # A number without any influence may be anything.
+    blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
+    return tuple(
+        Estimate(
+            p.name,
+            p.unit,
+            p.neutral,
+            float(values[i]) - turns,
+            (p.low if blind[i] else float(low[i])) - turns,
+            (p.high if blind[i] else float(high[i])) - turns,
+            bool(cube[i] <= 0.0 or cube[i] >= 1.0),
+            _meaning(space.model, p.name),
+        )
+        for i, p in enumerate(space.free)
+        for turns in [_whole_turns(p.name, float(values[i]))]
+    )
+
+
+def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:
+    """How large effects that were not found could be: from the sharpest look at each."""
+    sharpest: dict[str, tuple[float, Bound]] = {}
+    for prospect in looked_at:
+        first, value = next(iter(prospect.values.items()))
+        if not np.isfinite(prospect.deviation):
+            continue
+        spec = effect_of(prospect.effect, plant).parameters[0]
+        unit = spec.unit(angular=plant.is_angular(prospect.effect.partition("/")[0]))
+        reach = NINETY_FIVE * prospect.deviation
+        low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
+        known = sharpest.get(prospect.effect)
+        if known is None or prospect.deviation < known[0]:
+            sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, value + reach, unit))
+    return tuple(bound for _, bound in sharpest.values())
+
+
+def is_wide(p: Estimate) -> bool:
+    """Whether the interval of a number is wide beside the number itself."""
+    return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
+
+
+def _whole_turns(name: str, value: float) -> float:
+    """The whole turns in a phase [rad]; nothing for other numbers."""
+    return 2.0 * np.pi * round(value / (2.0 * np.pi)) if name.endswith(".phase") else 0.0
+
+
+def _meaning(model: Model, name: str) -> str:
+    effect, _, symbol = name.rpartition(".")
+    if not effect:
+        return model.plant.parameters[symbol].meaning
+    return next(p.meaning for p in effect_of(effect, model.plant).parameters if p.name == symbol)
