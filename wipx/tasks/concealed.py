@@ -74,7 +74,7 @@ class Concealed:
             write_json(folder / "score.json", _summary(seed, scores))
             draw_confusions(confusions(scores), folder / "confusions.png")
         if self.page is not None:
-            replace_table(Path(self.page), text)
+            replace_table(Path(self.page), text.partition("\n")[2].strip())  # without its title
         print(f"\n{text}\nwritten to {job.out}")
 
     def _seed(self, out: Path) -> int:
