@@ -28,7 +28,7 @@ from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.location import located
 from wipx.diagnosis.log import Log
-from wipx.diagnosis.nested import simpler
+from wipx.diagnosis.nested import CONTAINS, simpler
 from wipx.diagnosis.numbers import bounds, estimates, is_wide
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.diagnosis.robust import inflation
@@ -331,7 +331,7 @@ class _Case:
     ) -> tuple[FoundEffect, ...]:
         fit = rest.fit
         reduced = {effect: self._reduced(selection, fit, effect) for effect in fit.effects}
-        gains = {effect: max(fit.log_likelihood - reduced[effect].log_likelihood, 0.0) for effect in fit.effects}
+        gains = {effect: float(max(fit.log_likelihood - reduced[effect].log_likelihood, 0.0)) for effect in fit.effects}
         total = sum(gains.values()) or 1.0
         found = []
         for effect in sorted(fit.effects, key=lambda e: -gains[e]):
@@ -388,7 +388,7 @@ class _Case:
         rest = set(fit.effects) - {effect}
         for other in selection.replacements(fit, effect):
             name = next(iter(set(other.effects) - rest), effect)
-            if name == effect or _is_richer(other, effect, self.log):
+            if name == effect or _is_richer(other, name, effect, self.log):
                 continue
             if fit.log_likelihood - other.log_likelihood < CLOSE_CALL:
                 again = self.fitter.polished(self.fitter.fit(other.hypothesis, fit.levels))
@@ -434,7 +434,8 @@ def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
     return max(1.4826 * float(np.median(np.abs(values))) / np.sqrt(6.0), 1e-9)
 
 
-def _is_richer(other: Fit, effect: str, log: Log) -> bool:
+def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
+    contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
     replaced = simpler(other, log)
-    return replaced is not None and effect in replaced
+    return contained == effect or (replaced is not None and effect in replaced)

@@ -7,6 +7,13 @@ from wipx.diagnosis.log import Log
 from wipx.diagnosis.robust import covariance
 from wipx.identify.noise import quantisation
 
+CONTAINS = {  # rich law: the simple one that it can always imitate
+    "stribeck": "coulomb",
+    "presliding": "coulomb",
+    "sticky_spot": "coulomb",
+    "speed_limit": "saturation",
+    "payload_event": "payload",
+}
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
 BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
 CERTAIN = 2.0  # standard deviations
