@@ -212,7 +212,7 @@ class _Case:
         found = leftovers(self.fitter, fit, shapes)
         strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < SIGNIFICANT else 0.0)
         p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
-        explained = fit.log_likelihood - selection.nominal.log_likelihood
+        explained = fit.motion_likelihood - selection.nominal.motion_likelihood
         worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained)
         significant = p_value < SIGNIFICANT and strongest.gain >= worth
         if not significant and not self._is_far_off(fit):

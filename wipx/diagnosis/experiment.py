@@ -77,7 +77,7 @@ def next_experiment(
     for excitation in menu(fit.hypothesis.model, reach, rng, closed=closed):
         trial = None if excitation.mass and asked.has_payload_event else bench.tried(excitation, rng)
         if trial is not None:
-            run = Log.of((trial.recording,), log.plant)
+            run = Log.of((trial.recording,), log.plant).reporting_nothing(log)
             fitter = Fitter(Follower.of(simulator, run, setting.nominal))
             trials.append(trial)
             separations.append(asked.separations(fitter, trial.excitation.mass))
@@ -196,7 +196,7 @@ class _View:
                 break
             cube, cost = trials[best], float(costs[best])
         log = self.fitter.follower.log
-        values = int(log.counted.sum()) * len(log.channels)
+        values = int(log.counted.sum()) * log.signals
         return values * float(np.log1p(cost / values))
 
     def slopes(self, hypothesis: Hypothesis, cube: np.ndarray, information: np.ndarray) -> np.ndarray:

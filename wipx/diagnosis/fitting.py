@@ -50,6 +50,11 @@ class Fit:
     log_likelihood: float
 
     @property
+    def motion_likelihood(self) -> float:
+        """Log-likelihood without that of forces which the drives report."""
+        return self.log_likelihood - self.colour.reported
+
+    @property
     def effects(self) -> tuple[str, ...]:
         """Effects of the hypothesis."""
         return self.hypothesis.effects

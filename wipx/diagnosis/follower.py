@@ -52,7 +52,7 @@ class Follower:
     def innovations(
         self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray
     ) -> np.ndarray:
-        """Innovations in standard deviations of the observer, shape (P, R, m, K + 1).
+        """Innovations in standard deviations of the observer, then errors of reported forces, shape (P, R, m, K + 1).
 
         Args:
             batch: P models.
@@ -63,9 +63,13 @@ class Follower:
         log = self.log
         shown = self._shown(batch, gains, group, spread)
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
-        return _innovations(
-            log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last
+        found = np.zeros((batch.size, len(log.recordings), log.signals, len(log.rows)))
+        _innovations(
+            log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last, found
         )
+        if shown.delivered is not None:
+            _report_errors(log.reported, shown.delivered, log.counted, log.inputs.last, len(log.channels), found)
+        return found
 
     def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
         """Coordinates and rates that a model expects before it sees each row, shape (K + 1, 2 joints, R)."""
@@ -76,7 +80,10 @@ class Follower:
         start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         return self.simulator.follow(
-            batch, self.log.inputs, start, Observer(self.log.measured, corrections, group, spread)
+            batch,
+            self.log.inputs,
+            start,
+            Observer(self.log.measured, corrections, group, spread, reports=self.log.reported.shape[1] > 0),
         )
 
     @cached_property
@@ -94,10 +101,9 @@ class Follower:
 
 
 @cached
-def _innovations(measured, coordinates, rates, channels, whitening, group, last):
-    rows, joints, models, recordings = coordinates.shape
+def _innovations(measured, coordinates, rates, channels, whitening, group, last, out):
+    _, joints, models, recordings = coordinates.shape
     m = len(channels)
-    out = np.zeros((models, recordings, m, rows))
     error = np.zeros(m)
     for p in range(models):
         g = group[p]
@@ -113,4 +119,34 @@ def _innovations(measured, coordinates, rates, channels, whitening, group, last)
                         total += whitening[g, k, r, c, d] * error[d]
                     # Also where it is not a number: a model that fell over is only counted so far.
                     out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
-    return out
+
+
+@cached
+def _report_errors(reported, delivered, counted, last, first, out):
+    """Reported forces minus a + b F[k] + c F[k - 1] of the modelled force F, by least squares for each model.
+
+    A drive's torque constant and zero are not trusted, nor the instant within a row at which it reads its current:
+    what counts is the course of the force.
+    """
+    inputs = reported.shape[1]
+    known = np.ones(3)
+    for i in range(inputs):
+        size = max(np.std(reported[:, i]), 1e-12)
+        for p in range(delivered.shape[2]):
+            normal, right = 1e-9 * size * size * np.eye(3), np.zeros(3)
+            for r in range(delivered.shape[3]):
+                for k in range(1, last[r]):
+                    if counted[k, r]:
+                        known[1], known[2] = delivered[k, i, p, r], delivered[k - 1, i, p, r]
+                        for a in range(3):
+                            right[a] += known[a] * reported[k, i, r]
+                            for b in range(3):
+                                normal[a, b] += known[a] * known[b]
+            finite = np.all(np.isfinite(normal))
+            weights = np.linalg.solve(normal, right) if finite else np.zeros(3)
+            for r in range(delivered.shape[3]):
+                for k in range(1, last[r]):
+                    error = reported[k, i, r] - weights[0]
+                    error -= weights[1] * delivered[k, i, p, r] + weights[2] * delivered[k - 1, i, p, r]
+                    error *= 10.0 / size
+                    out[p, r, first + i, k] = min(max(error, -LARGEST), LARGEST) if finite else LARGEST

@@ -117,7 +117,8 @@ def _tested(
     fitter: Fitter, fit: Fit, gains: Gains, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
 ) -> Leftover:
     log = fitter.follower.log
-    innovations = _answers(fitter.follower.linear, gains, shape, log)
+    innovations = np.zeros((len(shape.columns), *fit.white.shape))
+    innovations[:, :, : len(log.channels)] = _answers(fitter.follower.linear, gains, shape, log)
     slopes = whitened_change(innovations, fit.colour, log).reshape(len(shape.columns), -1).T
     slopes = slopes - basis @ (basis.T @ slopes)
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)

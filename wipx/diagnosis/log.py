@@ -1,6 +1,6 @@
 """Recordings as one array: every row of every recording, side by side."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from wipx.core.recording import Recording
 from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
+ECHO = 1e-3  # of a reported force's variation, that must be more than a repeated command
 SETTLES = 0.15  # [s] after a recording's first row, in which the state and the commands before it are unknown
 
 
@@ -22,7 +23,9 @@ class Log:
         recordings: The recordings.
         inputs: Times and commands of all rows.
         measured: Recorded coordinates, then rates, shape (K + 1, 2 joints, R); zero where not recorded.
-        channels: Which of these are recorded, indices (m,); coordinates always.
+        channels: Which of these are recorded, indices (c,); coordinates always.
+        reported: Forces that the drives report, shape (K + 1, i, R) [N or N m]; i is the number of commands, or zero
+            where they do not, or only repeat the command.
         left_out: A recording whose rows do not count; None for none.
     """
 
@@ -31,6 +34,7 @@ class Log:
     inputs: Inputs
     measured: np.ndarray
     channels: np.ndarray
+    reported: np.ndarray
     left_out: int | None = None
 
     @classmethod
@@ -47,12 +51,21 @@ class Log:
         measured = np.zeros((len(inputs.t), len(names), len(recordings)))
         for i, recording in enumerate(recordings):
             measured[: len(recording), channels, i] = recording.stack(tuple(names[c] for c in channels))
-        return cls(plant, recordings, inputs, measured, np.array(channels))
+        return cls(plant, recordings, inputs, measured, np.array(channels), _reported(recordings, plant, len(inputs.t)))
 
     @property
     def joints(self) -> int:
         """Number of joints."""
         return len(self.plant.joints)
+
+    def reporting_nothing(self, like: "Log") -> "Log":
+        """With the reported forces of another log, all zero: they then tell nothing."""
+        return replace(self, reported=np.zeros((len(self.rows), like.reported.shape[1], len(self.recordings))))
+
+    @property
+    def signals(self) -> int:
+        """Number m of signals whose errors are weighed: the channels, then the reported forces."""
+        return len(self.channels) + self.reported.shape[1]
 
     @cached_property
     def rows(self) -> np.ndarray:
@@ -99,3 +112,21 @@ class Log:
             foretold = scaled @ np.linalg.lstsq(scaled, u[FORETELLING:], rcond=1e-10)[0]
             found[r, :, FORETELLING : len(u)] = (u[FORETELLING:] - foretold).T
         return found / np.maximum(found.std(axis=(0, 2), keepdims=True), 1e-12)
+
+
+def _reported(recordings: tuple[Recording, ...], plant: Plant, rows: int) -> np.ndarray:
+    """What the drives say beyond the command, shape (rows, i, R)."""
+    names = tuple(f"{command}_measured" for command in plant.commands)
+    if not all(name in recording for recording in recordings for name in names):
+        return np.zeros((rows, 0, len(recordings)))
+    for command, name in zip(plant.commands, names, strict=True):
+        pairs = [(r[command][1:], r[command][:-1], r[name][1:]) for r in recordings]
+        now, before, force = (np.concatenate(part) for part in zip(*pairs, strict=True))
+        known = np.column_stack([now, before, np.ones(len(now))])
+        left = force - known @ np.linalg.lstsq(known, force, rcond=None)[0]
+        if np.std(left) <= ECHO * np.std(force):
+            return np.zeros((rows, 0, len(recordings)))
+    found = np.zeros((rows, len(names), len(recordings)))
+    for r, recording in enumerate(recordings):
+        found[: len(recording), :, r] = recording.stack(names)
+    return found

@@ -227,7 +227,7 @@ class _Case:
     def values(self) -> int:
         """How many recorded values count."""
         log = self.fitter.follower.log
-        return int(log.counted.sum()) * len(log.channels)
+        return int(log.counted.sum()) * log.signals
 
     @property
     def nominal_likelihood(self) -> float:

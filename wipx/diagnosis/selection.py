@@ -81,11 +81,19 @@ class Selection:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
-        gain = larger.log_likelihood - smaller.log_likelihood
-        evidence = gain / inflation(larger, self.fitter.follower.log, indices)
+        overstated = inflation(larger, self.fitter.follower.log, indices)
         penalty = 0.5 * len(indices) * np.log(larger.rows)
-        explained = max(smaller.log_likelihood - self.nominal.log_likelihood, 0.0)
-        return evidence - penalty >= max(LEAST_GAIN, LEAST_SHARE * explained)
+        gain = larger.log_likelihood - smaller.log_likelihood
+        if gain / overstated - penalty < LEAST_GAIN:
+            return False
+        # The small print of a law is small beside the law, in the motion as well as in what the drives report.
+        moved = larger.motion_likelihood - smaller.motion_likelihood
+        reported = larger.colour.reported - smaller.colour.reported
+        least_moved = LEAST_SHARE * max(smaller.motion_likelihood - self.nominal.motion_likelihood, 0.0)
+        least_reported = LEAST_SHARE * max(smaller.colour.reported - self.nominal.colour.reported, 0.0)
+        return moved / overstated - penalty >= least_moved or reported / overstated - penalty >= max(
+            least_reported, LEAST_GAIN
+        )
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""
@@ -182,7 +190,7 @@ class Selection:
         return self.extensions(reduced)
 
     def _tolerance(self, best: Fit) -> float:
-        return max(4.0, LEAST_SHARE * (best.log_likelihood - self.nominal.log_likelihood))
+        return max(4.0, LEAST_SHARE * (best.motion_likelihood - self.nominal.motion_likelihood))
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.prospects_of(fit)

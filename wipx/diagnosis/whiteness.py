@@ -26,26 +26,37 @@ class Colour:
             shape (len(LAGS) m + SURPRISES inputs, m).
         whitening: Inverse Cholesky factor of what it leaves, shape (m, m).
         log_likelihood: Of the innovations that it was fitted to, up to a constant.
+        reported: The part of it that is the reported forces'.
     """
 
     weights: np.ndarray
     whitening: np.ndarray
     log_likelihood: float
+    reported: float
 
 
 def colour_of(innovations: np.ndarray, log: Log) -> Colour:
-    """The autoregression of innovations, shape (R, m, K + 1)."""
+    """The autoregression of innovations, shape (R, m, K + 1).
+
+    Errors of reported forces have one of their own: what a drive reports beyond the modelled force would explain the
+    motion in place of the physics that makes it.
+    """
     past, now = _past_and_present(innovations, log.counted, LAGS, log.surprises)
-    normal = past.T @ past
-    normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal) + 1e-12
-    weights = np.linalg.solve(normal, past.T @ now)
-    left = now - past @ weights
-    covariance = left.T @ left / len(left)
-    factor = np.linalg.cholesky(covariance + (1e-9 * np.trace(covariance) + 1e-12) * np.eye(len(covariance)))
-    log_likelihood = -len(left) * float(np.log(np.diag(factor)).sum())
+    m, inputs = now.shape[1], log.surprises.shape[1]
+    lagged = np.tile(np.arange(m), len(LAGS))
+    motion = np.concatenate([lagged < len(log.channels), np.ones(SURPRISES * inputs, dtype=bool)])
+    weights, whitening = np.zeros((past.shape[1], m)), np.zeros((m, m))
+    likelihoods = []
+    for known, signals in ((motion, np.arange(m) < len(log.channels)), (~motion, np.arange(m) >= len(log.channels))):
+        likelihoods.append(0.0)
+        if signals.any():
+            own, factor = _regressed(past[:, known], now[:, signals])
+            weights[np.ix_(known, signals)] = own
+            whitening[np.ix_(signals, signals)] = np.linalg.inv(factor)
+            likelihoods[-1] -= len(now) * float(np.log(np.diag(factor)).sum())
     # Where the model ran away innovations stand at their limit, which a regression takes for well predicted.
-    log_likelihood -= LARGEST * np.count_nonzero(np.abs(now) >= LARGEST)
-    return Colour(weights, np.linalg.inv(factor), log_likelihood)
+    runaway = LARGEST * np.count_nonzero(np.abs(now) >= LARGEST)
+    return Colour(weights, whitening, sum(likelihoods) - runaway, likelihoods[1])
 
 
 def whitened(innovations: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
@@ -57,6 +68,17 @@ def whitened_change(change: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
     """What a small change of innovations (P, R, m, K + 1) makes of the white ones; the commands do not change."""
     none = np.zeros_like(log.surprises)
     return _whitened(change, log.counted, LAGS, none, colour.weights, colour.whitening)
+
+
+def _regressed(past: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of the past, and the Cholesky factor of the covariance of what they leave."""
+    normal = past.T @ past
+    normal[np.diag_indices_from(normal)] += 1e-9 * np.trace(normal) / len(normal) + 1e-12
+    weights = np.linalg.solve(normal, past.T @ now)
+    left = now - past @ weights
+    covariance = left.T @ left / len(left)
+    ridge = (1e-9 * np.trace(covariance) + 1e-12) * np.eye(len(covariance))
+    return weights, np.linalg.cholesky(covariance + ridge)
 
 
 @cached

@@ -1,7 +1,8 @@
 """The path from the command to the force on a joint, in causal order; compiled.
 
-Delay, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash. Every part is
-a loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
+Delay, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash. A drive that reports
+its force knows it up to the lag; ripple and backlash are mechanical. Every part is a loop over the lanes of a
+block and is skipped where it is absent (see `wipx.sim.kernel`).
 """
 
 from wipx.core.law import clip, inlined, law, sign, sin_cos
@@ -83,6 +84,9 @@ def actuator_path(S, on, j):
             rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
             S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w] if S[R.STEP * W + w] > 0.0 else S[a + w]
             S[u + w] += rest * S[R.LAG_MEAN * W + w]
+    if on[R.ON_REPORT]:
+        for w in range(W):
+            S[(R.DELIVERED + j) * W + w] += S[R.STEP * W + w] * S[u + w]
     if on[R.ON_RIPPLE]:
         for w in range(W):
             angle = S[R.RIPPLE_PERIODS * W + w] * S[(R.MID + j) * W + w] + S[R.RIPPLE_PHASE * W + w]

@@ -35,11 +35,14 @@ class Rollouts:
         coordinates: As the sensors show them, shape (K + 1, joints, P, R) [m, rad].
         rates: True rates, shape (K + 1, joints, P, R) [m/s, rad/s].
         commands: Commands of each row, shape (K, inputs, P, R) (R only open loop: (K, inputs, 1, R)).
+        delivered: Mean force of the drives over each row, before what they cannot know (ripple, backlash), shape
+            (K, inputs, P, R) [N or N m]; None where it was not asked for.
     """
 
     coordinates: np.ndarray
     rates: np.ndarray
     commands: np.ndarray
+    delivered: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,14 @@ class Observer:
         group: Which of the gains each model has, shape (P,).
         spread: Half width by which single commands scatter about the mean that the log has, shape (P,)
             [N or N m]; thresholds of the actuator answer to single commands.
+        reports: Whether to tell the forces of the drives.
     """
 
     recorded: np.ndarray
     gains: np.ndarray
     group: np.ndarray
     spread: np.ndarray
+    reports: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,8 @@ class AnalyticSimulator:
         """
         run = _Run(self, batch, inputs)
         states = run.states(initial)
+        if observer.reports:
+            run.report()
         run.advance(states, 0, run.rows, observer=observer)
         return run.rollouts(inputs.commands[:, :, None, :])
 
@@ -206,6 +213,12 @@ class _Run:
         self.out = np.empty((self.rows + 1, 4, self.lanes))
         late = bool(self.coefficients.present[R.ON_SENSOR_DELAY])
         self.past = np.zeros((self.rows + 1, 4, self.lanes) if late else (1, 4, 1))
+        self.delivered = np.zeros((1, 2, 1))
+
+    def report(self) -> None:
+        """Keep the forces of the drives too."""
+        self.coefficients.present[R.ON_REPORT] = True
+        self.delivered = np.zeros((self.rows, 2, self.lanes))
 
     def states(self, initial: np.ndarray) -> np.ndarray:
         states = np.zeros((R.STATES, self.lanes))
@@ -256,6 +269,7 @@ class _Run:
                 group,
                 self.past,
                 self.out,
+                self.delivered,
                 first_row,
                 last_row,
                 begin,
@@ -294,4 +308,8 @@ class _Run:
         first, last = self.joints[0], self.joints[-1] + 1  # slices, not copies: the joints are neighbours
         coordinates = self.out[:, first:last].reshape(shape)
         rates = self.out[:, 2 + first : 2 + last].reshape(shape)
-        return Rollouts(coordinates, rates, commands)
+        if not self.coefficients.present[R.ON_REPORT]:
+            return Rollouts(coordinates, rates, commands)
+        driven = [joint_index(site) for site in self.plant.actuated]
+        forces = self.delivered[:, driven].reshape(self.rows, len(driven), self.batch.size, self.inputs.windows)
+        return Rollouts(coordinates, rates, commands, forces)

@@ -119,6 +119,15 @@ def replay(S, on, u_rows, ramps, lanes, actuated, k):
 
 
 @law
+def report(S, counts, k, lane0, count, delivered):
+    """The mean force of the drives over row k."""
+    for j in range(2):
+        for w in range(count):
+            length = max(counts[w] * S[R.ROW_STEP * W + w], 1e-12)
+            delivered[k, j, lane0 + w] = S[(R.DELIVERED + j) * W + w] / length
+
+
+@law
 def set_step(S, on, counts, s):
     """The step of every lane, zero for one that is through with this row, and what lags do in it."""
     for w in range(W):
@@ -162,6 +171,7 @@ def rollout(
     group,
     past,
     out,
+    delivered,
     first_row,
     last_row,
     begin,
@@ -192,6 +202,7 @@ def rollout(
         group: Which of them each model has, shape (P,).
         past: True coordinates and rates for sensor delays, shape (K + 1, 4, lanes); else (1, 4, 1).
         out: Coordinates as recorded, then true rates, shape (K + 1, 4, lanes).
+        delivered: Mean force of each joint's drive over each row, shape (K, 2, lanes); else (1, 2, 1).
         first_row: Row at which the states stand.
         last_row: Row to which they are brought.
         begin: First lane.
@@ -223,11 +234,17 @@ def rollout(
                 feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:
                 replay(S, on, u_rows, ramps, lanes, actuated, k)
+            if on[R.ON_REPORT]:
+                for w in range(W):
+                    S[R.DELIVERED * W + w] = 0.0
+                    S[R.DELIVERED1 * W + w] = 0.0
             least, most = begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k)
             for s in range(most):
                 if s == 0 or s >= least:
                     set_step(S, on, counts, s)
                 step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
+            if on[R.ON_REPORT]:
+                report(S, counts, k, lane0, count, delivered)
         record(S, on, past, t_rows, lanes, last_row, out, lane0, count)
         for w in range(count):
             for i in range(R.STATES):

@@ -53,6 +53,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     COMMAND, COMMAND1, DRIVE, DRIVE1,  # command now, and the force that comes of it
     SPREAD,  # half width of the single commands about their mean
     RAMP, RAMP1, PHASE, PER_ROW,  # change of the command along the row, place in the row, one over its steps
+    DELIVERED, DELIVERED1,  # integral of the drive's force over the row
     M11, M12, M22, COUPLING_NOW, GRAVITY_NOW,
     W11, W12, W22, YIELD, YIELD1, NEXT, NEXT1,  # inverse of the mass matrix, rates at the end
     FORCE, FORCE1, DAMPING, DAMPING1, PLUS, PLUS1, MINUS, MINUS1,
@@ -62,7 +63,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 62)  # fmt: skip
+) = range(N_STATES, N_STATES + 64)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 
@@ -72,6 +73,6 @@ STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
     ON_DELAY, ON_OFFSET, ON_DEAD_ZONE, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG, ON_RIPPLE, ON_BACKLASH,
     ON_DAMPING, ON_DRAG, ON_DRAG1, ON_FRICTION, ON_STRIBECK, ON_STRIBECK1, ON_SPOT, ON_LOAD, ON_LOAD1,
     ON_BRISTLE, ON_BRISTLE1, ON_PAPER, ON_PAPER1, ON_SENSOR_DELAY, ON_SMOOTHING,
-    ON_RAMP, ON_REMAINDER, ON_REMAINDER1, ON_SWING, ON_SWING1,
+    ON_RAMP, ON_REMAINDER, ON_REMAINDER1, ON_SWING, ON_SWING1, ON_REPORT,
     N_FLAGS,
-) = range(34)  # fmt: skip
+) = range(35)  # fmt: skip
