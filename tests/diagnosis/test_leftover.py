@@ -36,6 +36,17 @@ def test_a_force_without_a_name_is_flagged_and_stood_in_for(kind: str, fresh_see
     assert np.sqrt(np.mean(shift**2)) < 0.5  # of a force of size one
 
 
+def test_dry_friction_that_changes_along_the_rail_is_flagged(fresh_seed: int):
+    levels = {f"f{i}": 0.5 * (1.0 + wave) for i, wave in enumerate(WAVES)}
+    wavy = {"translation/remainder": {"signal": 0.0, "factor": -1.0, "low": -0.3, "high": 0.3, **levels}}
+    answer = bench("linear_axis", wavy, fresh_seed, count=4, duration=5.0).diagnosed()
+    assert answer.verdict == "unexplained"
+    assert answer.unexplained.site == "translation"
+    assert answer.unexplained.shape == "dry friction on translation that changes with x"
+    for column, nominal in answer.held_out.nominal.items():
+        assert answer.held_out.completed[column] < 0.3 * nominal
+
+
 @pytest.mark.slow
 def test_what_swings_along_is_named_beyond_the_vocabulary(fresh_seed: int):
     resonance = {"translation/resonance": {"m": 0.3, "f": 2.0, "zeta": 0.05}}

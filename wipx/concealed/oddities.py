@@ -14,7 +14,7 @@ def oddity_names(kind: str) -> tuple[str, ...]:
     return everywhere + {
         "wip": ("sloshing", "flexible_body", "pitch_cogging", "wheel_slip", "wavy_friction"),
         "cartpole": ("sloshing", "flexible_body", "pitch_cogging", "wavy_friction"),
-        "pendulum": ("sloshing", "flexible_body", "pitch_cogging"),
+        "pendulum": ("sloshing", "flexible_body"),  # its cogging would be the ripple of its motor
         "linear_axis": ("sloshing", "wavy_friction"),
         "double_pendulum": (),
     }.get(kind, ())

@@ -263,7 +263,7 @@ class _Case:
         repeated = transfer(self.fitter, fit)
         held_out, traces = judged(self.judge, nominal, repeated.models, self.recordings)
         fitted, _ = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
-        ends = estimates(fit, selection.nominal, self.log)
+        ends = estimates(self.fitter, fit, selection.nominal)
         effects = self._effects(selection, rest, repeated, ends, shapes)
         verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
         unexplained = self._unexplained(rest)
@@ -412,6 +412,7 @@ class _Case:
         words = {
             "force": f"a force over {shape.signal} on {site}",
             "gain": "an actuator gain that drifts over time",
+            "friction": f"dry friction on {site} that changes with {shape.signal}",
             "resonance": f"something that swings with {site} at about {shape.signal} Hz",
         }[shape.kind]
         curve = curve_of(shape, rest.fit, rest.spread, self.log) if len(rest.spread) else None

@@ -1,7 +1,7 @@
 """What a fit leaves over: forces of any shape, tested on its innovations.
 
-Score tests of forces over position, speed, angle, command and time, of a command whose gain drifts and
-of resonances, on each joint (after Kristensen, Madsen, Jorgensen 2004, and the model-error models of
+Score tests of forces over position, speed, angle, command and time, of dry friction that changes over position,
+command or time, of a command whose gain drifts and of resonances, on each joint (after Kristensen, Madsen, Jorgensen 2004, and the model-error models of
 Ljung 1999, System Identification, sec. 16.6). They say whether something is left, where, and what it looks like.
 """
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from wipx.core.plant import Plant
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import Gains, Linearisation, transition_over
@@ -21,6 +22,7 @@ from wipx.sim.cache import cached
 ENDS = (0.005, 0.995)  # quantiles of a signal between which its knots lie
 FREQUENCIES = np.geomspace(0.5, 16.0, 12)  # [Hz] of resonances that are looked for
 DAMPING = 0.05  # ratio, of the same
+SLOW = 0.02  # of the largest speed, at which half of dry friction has built up
 RIDGE = 1e-9
 
 
@@ -30,7 +32,7 @@ class Shape:
 
     Attributes:
         joint: Its index.
-        kind: "force" over a signal, "gain" (share of the command over a signal) or "resonance".
+        kind: "force" over a signal, "friction" (its level), "gain" (share of the command) or "resonance".
         signal: Column, rate or command; "t" for time, a frequency for a resonance [Hz].
         knots: Where the forces are given, shape (KNOTS,); empty for a resonance.
         columns: Forces of unit size at every row, shape (C, K + 1, R).
@@ -88,6 +90,9 @@ def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
             knots, hats = _hats(values, log.rows)
             if knots is not None:
                 found.append(Shape(joint, "force", name, knots, hats))
+                if name in _wearing(log.plant, joint):
+                    direction = _direction(signals[log.plant.rates[joint]], log.rows)
+                    found.append(Shape(joint, "friction", name, knots, -hats * direction))
         if site in log.plant.actuated:
             command = signals[log.plant.commands[log.plant.actuated.index(site)]]
             knots, hats = _hats(signals["t"], log.rows)
@@ -176,6 +181,18 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
                 push[i], push[joints + i] = 0.5 * dt * dt * b[g, i], dt * b[g, i]
             states = (transition @ correction) @ states + np.outer(push, forces[:, k, r])
     return out
+
+
+def _wearing(plant: Plant, joint: int) -> tuple[str, ...]:
+    """Signals over which the friction of a joint is looked at: its place, its load, time."""
+    loads = [c for c, site in zip(plant.commands, plant.actuated, strict=True) if site == plant.joints[joint]]
+    return (plant.coordinates[joint], *loads, "t")
+
+
+def _direction(rate: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Sign of a rate, without a jump where it is nearly at rest."""
+    slow = SLOW * max(float(np.quantile(np.abs(rate[rows]), ENDS[1])), 1e-12)
+    return rate / (np.abs(rate) + slow)
 
 
 def _hats(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:

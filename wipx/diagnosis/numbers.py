@@ -1,13 +1,14 @@
 """Numbers of a diagnosis: estimates with 95 % intervals, and bounds of what was not found."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from wipx.core.diagnosis import Bound
-from wipx.core.model import Model
+from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.results import Estimate
-from wipx.diagnosis.fitting import Fit
-from wipx.diagnosis.log import Log
+from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.robust import covariance
 from wipx.diagnosis.screening import Prospect
 from wipx.effects.catalogue import effect_of
@@ -18,13 +19,15 @@ UNFELT = 1e-3  # standard deviations that innovations change over the whole rang
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 
-def estimates(fit: Fit, nominal: Fit, log: Log) -> tuple[Estimate, ...]:
+def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     """Every number of a fit with its 95 % interval."""
+    log = fitter.follower.log
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     explained = max(fit.log_likelihood - nominal.log_likelihood, 0.0)
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
-    deviation = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
+    chance = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
+    deviation = np.hypot(chance, shift_by_step(fitter, fit))
     values = space.to_values(cube)
     low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
     high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
@@ -71,6 +74,20 @@ def is_wide(p: Estimate) -> bool:
 def _whole_turns(name: str, value: float) -> float:
     """The whole turns in a phase [rad]; nothing for other numbers."""
     return 2.0 * np.pi * round(value / (2.0 * np.pi)) if name.endswith(".phase") else 0.0
+
+
+def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
+    """How far the position in the cube moves when the simulator halves its step, shape (D,).
+
+    One Gauss-Newton step: the error of the integrator, and how rough the likelihood is where joints stick and slip
+    between two steps.
+    """
+    if not len(fit.hypothesis.cube):
+        return np.zeros(0)
+    follower = fitter.follower
+    finer = Fitter(replace(follower, simulator=replace(follower.simulator, step=0.5 * follower.simulator.step)))
+    change = finer.white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
+    return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
 
 
 def _meaning(model: Model, name: str) -> str:

@@ -17,6 +17,7 @@ from wipx.sim.coefficients import joint_index
 
 ROUNDS = 3  # of linearising anew
 NUGGET = 1e-8
+FACTORS = {"force": 0.0, "gain": 1.0, "friction": -1.0}  # of the effect `remainder`, by kind of shape
 
 
 def process_mean(slopes: np.ndarray, white: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -72,7 +73,7 @@ def with_force(setting: Setting, fit: Fit, name: str, shape: Shape, force: np.nd
     """The hypothesis of a fit, on a nominal model that has the force."""
     values = {
         "signal": float(_code(shape, log)),
-        "factor": 1.0 if shape.kind == "gain" else 0.0,
+        "factor": FACTORS[shape.kind],
         "low": float(shape.knots[0]),
         "high": float(shape.knots[-1]),
         **{f"f{i}": float(f) for i, f in enumerate(force)},
@@ -88,8 +89,9 @@ def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, log: Log) -> Curve:
     values = fit.hypothesis.model.effects[f"{site}/remainder"]
     force = np.array([values[f"f{i}"] for i in range(KNOTS)])
     unit = "share of u" if shape.kind == "gain" else "N m" if plant.is_angular(site) else "N"
+    words = {"gain": "change of the actuator gain", "friction": "change of dry friction", "force": "unknown force"}
     return Curve(
-        f"{'change of the actuator gain' if shape.kind == 'gain' else 'force of unknown origin'} on {site}",
+        f"{words[shape.kind]} on {site}",
         shape.signal,
         "s" if shape.signal == "t" else plant.unit_of(shape.signal),
         unit,

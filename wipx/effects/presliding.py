@@ -1,4 +1,4 @@
-"""Pre-sliding friction (Dahl): a bristle bends before the joint slides, and remembers it."""
+"""Pre-sliding friction (Dahl, damped as in LuGre): a bristle bends before the joint slides, and remembers it."""
 
 from wipx.core.effect import JOINT_SITES, Effect
 from wipx.core.law import law, maximum, relaxing
@@ -10,13 +10,14 @@ EFFECT = Effect(
     parameters=(
         Parameter("F_c", "level in steady sliding", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02, 0.1)),
         Parameter("stiffness", "of the bristle", "stiffness", 1.0, 1e-2, 1e5, 100.0, grid=(1.0, 10.0, 100.0)),
+        Parameter("damping", "of the bristle", "damping", 0.0, 0.0, 3.0, 0.0, default=0.0),
     ),
-    law="-stiffness z, z' = v - stiffness abs(v) z / F_c",
+    law="-(stiffness z + damping z'), z' = v - stiffness abs(v) z / F_c",
     linear_in=(
         "F_c",
         "stiffness",
     ),
-    source="Dahl 1968, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1",
+    source="Dahl 1968, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1; Canudas de Wit et al. 1995",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "lugre"),
 )
 

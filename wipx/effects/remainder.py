@@ -1,7 +1,7 @@
-"""A force that no physics is known for: piecewise linear over one signal.
+"""A force, gain or dry friction that no physics is known for: piecewise linear over one signal.
 
 It stands in for what a diagnosis cannot name. Its curve is drawn from a Gaussian process prior in
-`wipx.diagnosis.remainder`; here it is only evaluated.
+`wipx.diagnosis.stand_in`; here it is only evaluated.
 """
 
 from wipx.core.effect import JOINT_SITES, Effect
@@ -16,12 +16,12 @@ EFFECT = Effect(
     sites=JOINT_SITES,
     parameters=(
         Parameter("signal", "0, 1 coordinates, 2, 3 rates, 4, 5 commands, 6 time", "ratio", 0.0, 0.0, 6.0, 0.0),
-        Parameter("factor", "0 for a force, 1 for a share of the command", "ratio", 0.0, 0.0, 1.0, 0.0),
+        Parameter("factor", "0 for a force, 1 for a share of the command, -1 for dry friction", "ratio", 0.0, -1.0, 1.0, 0.0),
         Parameter("low", "first knot, in the unit of the signal", "ratio", 0.0, -HIGHEST, HIGHEST, 0.0),
         Parameter("high", "last knot", "ratio", 1.0, -HIGHEST, HIGHEST, 1.0),
         *(Parameter(f"f{i}", f"force at knot {i}", "force", 0.0, -2.0, 2.0, 0.0) for i in range(KNOTS)),
     ),
-    law="+ f(signal), piecewise linear between nine knots",
+    law="+ f(signal), + f(signal) u or - f(signal) sign(v), piecewise linear between nine knots",
     linear_in=tuple(f"f{i}" for i in range(KNOTS)),
     source="Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, ch. 2",
     beyond=True,

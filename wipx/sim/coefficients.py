@@ -225,7 +225,12 @@ def _joint(f: _Filler, site: str, j: int) -> None:
     )
     if f.present[[R.ON_SPOT, R.ON_LOAD + j]].any():
         f.present[R.ON_FRICTION] = True
-    _replace(f, f"{site}/presliding", R.ON_BRISTLE + j, {"stiffness": R.BRISTLE + j, "F_c": R.SLIDING + j})
+    _replace(
+        f,
+        f"{site}/presliding",
+        R.ON_BRISTLE + j,
+        {"stiffness": R.BRISTLE + j, "damping": R.BRISTLE_DAMPING + j, "F_c": R.SLIDING + j},
+    )
     _replace(
         f,
         f"{site}/lugre",
@@ -272,6 +277,7 @@ def _remainder(f: _Filler, site: str, j: int) -> None:
     f.present[R.ON_REMAINDER + j] = True
     for symbol, row in (("signal", R.REMAINDER_SIGNAL), ("factor", R.REMAINDER_FACTOR), ("low", R.REMAINDER_LOW)):
         f.rows[row + j] = values[symbol]
+    f.present[R.ON_FRICTION] |= bool(np.any(values["factor"] < 0.0))
     f.rows[R.REMAINDER_PER_UNIT + j] = (KNOTS - 1) / np.maximum(values["high"] - values["low"], 1e-12)
     for i in range(KNOTS):
         f.rows[R.REMAINDER + 2 * i + j] = values[f"f{i}"]

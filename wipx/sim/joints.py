@@ -93,7 +93,7 @@ def smooth_friction(S, on, j):
 
 @inlined
 def remainder(S, j):
-    """The piecewise linear force of joint j over one signal."""
+    """The piecewise linear force of joint j over one signal, or level of its dry friction."""
     for w in range(W):
         code = int(S[(R.REMAINDER_SIGNAL + j) * W + w])
         if code < 2:
@@ -110,8 +110,12 @@ def remainder(S, j):
         low, high = S[(R.REMAINDER + 2 * knot + j) * W + w], S[(R.REMAINDER + 2 * knot + 2 + j) * W + w]
         force = low + (place - knot) * (high - low)
         share = S[(R.REMAINDER_FACTOR + j) * W + w]
-        command = S[(R.COMMAND + j) * W + w]
-        S[(R.FORCE + j) * W + w] += force * ((1.0 - share) + share * command)
+        if share < 0.0:
+            S[(R.PLUS + j) * W + w] = maximum(S[(R.PLUS + j) * W + w] + force, 0.0)
+            S[(R.MINUS + j) * W + w] = maximum(S[(R.MINUS + j) * W + w] + force, 0.0)
+        else:
+            command = S[(R.COMMAND + j) * W + w]
+            S[(R.FORCE + j) * W + w] += force * ((1.0 - share) + share * command)
 
 
 @law
