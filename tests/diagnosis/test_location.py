@@ -8,17 +8,17 @@ from wipx.core.model import ModelBatch
 from wipx.diagnosis.location import excess_of
 
 
-def test_shares_of_sites_sum_to_one():
+def test_shares_of_sites_sum_to_one(fresh_seed: int):
     hidden = {"translation/viscous": {"sigma": 2.0}, "actuator/delay": {"tau": 0.006}}
-    sites = bench("wip", hidden, seed=21).diagnosed().location.sites
+    sites = bench("wip", hidden, fresh_seed).diagnosed().location.sites
     assert set(sites) == {"translation", "actuator"}
     assert sum(sites.values()) == pytest.approx(1.0)
     assert all(share > 0.0 for share in sites.values())
 
 
-def test_a_sticky_spot_is_put_on_the_rail():
+def test_a_sticky_spot_is_put_on_the_rail(fresh_seed: int):
     hidden = {"translation/sticky_spot": {"F_c": 1.0, "lo": 0.0, "hi": 0.05}}
-    answer = bench("linear_axis", hidden, seed=11, count=3).diagnosed()
+    answer = bench("linear_axis", hidden, fresh_seed, count=3).diagnosed()
     assert [effect.name for effect in answer.effects] == ["translation/sticky_spot"]
     (region,) = answer.location.regions
     assert region.signal == "x"

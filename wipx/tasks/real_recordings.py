@@ -1,53 +1,96 @@
-"""`task=real_recordings`: what identification finds on recordings of real hardware, as one table.
+"""`task=real_recordings`: what the diagnosis finds, blind, on recordings of real hardware, as one table.
 
-Each case is a dataset, physics that is switched on, and a horizon. A case leaves a folder like
-that of `task=identify`; the table is written from them.
+Each case is a dataset, what its authors know of the physics that their nominal model lacks, and their model with
+that physics. The diagnosis sees neither, nor the held-out recordings, on which the nominal, the completed and the
+authors' model are compared. A case leaves a folder like that of `task=diagnose`.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from wipx.core.results import Estimate, IdentificationResult
-from wipx.identify.friction import JointFriction
-from wipx.identify.objectives import MultiStep, Windowed
+import numpy as np
+
+from wipx.core.diagnosis import Diagnosis
+from wipx.core.errors import InputError, check_positive, unknown_name
+from wipx.core.model import Model
+from wipx.core.recording import Recording, RecordingSplit
+from wipx.diagnosis.case import HORIZON
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.recordings.model_file import check_keys, mapping_of, model_from_mapping, write_model
 from wipx.recordings.source import RecordingSource
-from wipx.report.numbers import compact, with_interval
-from wipx.tasks.identify import Identify
+from wipx.tasks.diagnose import Diagnose
 from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table
+from wipx.tasks.real_table import HeldOutErrors, Outcome, markdown
+from wipx.tasks.results import replace_table, write_json, written_together
 
 
 @dataclass(frozen=True)
 class Case:
-    """One identification.
+    """One diagnosis.
 
     Attributes:
         dataset: Name of the source.
-        model: What is switched on, in words.
-        effects: Effects whose parameters are free, as "site/kind".
-        free: Further free parameters, with the relative standard deviation of a prior or None.
-        held_out: Files that are held out instead of the dataset's own choice.
-        horizon: Length of the predictions by which models are judged [s].
+        known: What the authors found missing, by "site/kind", with the figure that they give, in words.
+        authors: Their full model: `parameters` and `effects` that replace or join those of the nominal one, as in
+            robot.yaml; empty where they published none.
+        spans: Parts of recordings to use instead of the dataset's, as in `RecordingSource`.
+        uncertainty: Relative standard deviation of further nominal numbers that are not exact.
+        horizons: Lengths of the predictions by which models are judged [s].
         lead: Time before a prediction from which its state is estimated [s].
-        fit_horizon: Length of the windows that are fitted [s].
-        windowed: Whether to fit predictions instead of multiple shooting.
-        show: Parameters that the table names.
-        known: What is known of them from elsewhere, in words.
     """
 
     dataset: str
-    model: str
-    effects: tuple[str, ...] = ()
-    free: dict[str, float | None] = field(default_factory=dict)
-    held_out: tuple[str, ...] = ()
-    horizon: float = 0.5
+    known: dict[str, str]
+    authors: dict[str, dict[str, Any]] = field(default_factory=dict)
+    spans: dict[str, list[float | None]] = field(default_factory=dict)
+    uncertainty: dict[str, float] = field(default_factory=dict)
+    horizons: tuple[float, ...] = (HORIZON,)
     lead: float = 0.1
-    fit_horizon: float = 0.5
-    windowed: bool = False
-    show: tuple[str, ...] = ()
-    known: str = ""
+
+    def __post_init__(self) -> None:
+        for horizon in self.horizons:
+            check_positive(horizons=horizon)
+        check_positive(lead=self.lead)
+
+    def of(self, source: RecordingSource) -> RecordingSource:
+        """A dataset with the case's own choices."""
+        robot = source.robot
+        if robot is not None and self.uncertainty:
+            robot = {**robot, "uncertainty": {**robot.get("uncertainty", {}), **self.uncertainty}}
+        return replace(source, robot=robot, spans=self.spans or source.spans)
+
+    def authors_model(self, nominal: Model, where: str) -> Model | None:
+        """The authors' full model; None where they published none.
+
+        Raises:
+            InputError: the model is at fault; `where` is its key.
+        """
+        if not self.authors:
+            return None
+        check_keys(self.authors, ("parameters", "effects"), where)
+        parameters = {**nominal.parameters, **mapping_of(self.authors, "parameters", where)}
+        effects = {**nominal.effects, **mapping_of(self.authors, "effects", where)}
+        return model_from_mapping({"plant": nominal.plant.kind, "parameters": parameters, "effects": effects}, where)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A case whose recordings have been read.
+
+    Attributes:
+        case: Its settings.
+        source: The dataset with the case's own choices.
+        split: What the diagnosis sees, and what it does not.
+        authors: The authors' full model; None where they published none.
+    """
+
+    case: Case
+    source: RecordingSource
+    split: RecordingSplit
+    authors: Model | None
 
 
 @dataclass(frozen=True)
@@ -66,54 +109,109 @@ class RealRecordings:
     only: tuple[str, ...] = ()
     page: str | None = None
 
+    def __post_init__(self) -> None:
+        for name in self.only:
+            if name not in self.cases:
+                raise unknown_name("case", name, self.cases, "task.only")
+
     def run(self, job: Job) -> None:
-        """Identify case by case and write the table."""
-        cases = {
-            name: job.build({"_target_": f"{Case.__module__}.Case", **settings}, f"task.cases.{name}")
-            for name, settings in self.cases.items()
-            if not self.only or name in self.only
-        }
-        sources = {name: job.build(node, f"task.sources.{name}") for name, node in self.sources.items()}
-        rows = []
-        for number, (name, case) in enumerate(cases.items(), start=1):
-            print(f"\n[{number}/{len(cases)}] {name}")
-            rows.append(_row(case, self._identify(job, name, case, sources[case.dataset])))
-        table = "\n".join([*_HEAD, *rows]) + "\n"
+        """Diagnose case by case and write the table."""
+        prepared = self._prepared(job)
+        outcomes = []
+        for number, (name, one) in enumerate(prepared.items(), start=1):
+            print(f"\n[{number}/{len(prepared)}] {name}")
+            outcomes.append(outcome_of(replace(job, out=job.out / name), one))
+        table = markdown(outcomes)
         (job.out / "table.md").write_text(table, encoding="utf-8")
         if self.page is not None:
             replace_table(Path(self.page), table)
         print(f"\n{table}\ntable: {job.out / 'table.md'}")
 
-    def _identify(self, job: Job, name: str, case: Case, source: RecordingSource) -> IdentificationResult:
-        objective = Windowed(case.fit_horizon, case.lead) if case.windowed else MultiStep(case.fit_horizon)
-        own: Mapping[str, Any] = {"objective": objective, "friction": JointFriction(())}
-        chosen = replace(source, held_out=list(case.held_out)) if case.held_out else source
-        part = job.part
+    def _prepared(self, job: Job) -> dict[str, Prepared]:
+        """Every dataset, read before the first diagnosis, so that a missing one is reported at once."""
+        cases = {
+            name: job.build({"_target_": f"{Case.__module__}.Case", **settings}, f"task.cases.{name}")
+            for name, settings in self.cases.items()
+            if not self.only or name in self.only
+        }
+        sources = {name: case.of(self._source(job, case.dataset)) for name, case in cases.items()}
+        check_there(sources.values())
+        prepared = {}
+        for name, case in cases.items():
+            source = sources[name]
+            authors = case.authors_model(source.describe().model, f"task.cases.{name}.authors")
+            prepared[name] = Prepared(case, source, source.split(source.load()), authors)
+        return prepared
 
-        def given(group: str) -> Any:
-            return own[group] if group in own else part(group)
-
-        mine = replace(job, out=job.out / name, effects=case.effects, free=case.free, part=given)
-        return Identify(case.horizon, case.lead).complete(mine, chosen)
-
-
-_HEAD = [
-    "| recordings | model | horizon, s | held-out error before | after | identified | known from elsewhere |",
-    "| --- | --- | --- | --- | --- | --- | --- |",
-]
-
-
-def _row(case: Case, result: IdentificationResult) -> str:
-    errors = result.held_out or result.fit
-    before, after = (
-        ", ".join(f"{column} {compact(value, 3)} {result.units[column]}" for column, value in model.items())
-        for model in (errors.nominal, errors.completed)
-    )
-    estimates = {e.name: e for e in result.estimates}
-    found = "; ".join(_shown(estimates[name]) for name in case.show)
-    return f"| {result.title} | {case.model} | {case.horizon:g} | {before} | {after} | {found} | {case.known} |"
+    def _source(self, job: Job, dataset: str) -> RecordingSource:
+        if dataset not in self.sources:
+            raise unknown_name("dataset", dataset, self.sources, "task.cases")
+        return job.build(self.sources[dataset], f"task.sources.{dataset}")
 
 
-def _shown(estimate: Estimate) -> str:
-    rounded = with_interval(estimate.value, estimate.low, estimate.high)
-    return f"{estimate.name} = {rounded.value} {rounded.ends} {estimate.unit}"
+def check_there(sources: Iterable[RecordingSource]) -> None:
+    """Refuse sources whose folders are missing.
+
+    Raises:
+        InputError: it lists all missing folders, the files that are needed of each, and where they come from.
+    """
+    missing = [
+        f"{source.path}: {', '.join(source.files)} (from {source.origin})"
+        for source in sources
+        if source.path is None or not Path(source.path).expanduser().is_dir()
+    ]
+    if missing:
+        raise InputError(f"recordings are missing; get them, or set WIPX_RECORDINGS=FOLDER: {'; '.join(missing)}")
+
+
+def outcome_of(job: Job, prepared: Prepared) -> Outcome:
+    """Diagnose what is to be fitted, and predict what is held out.
+
+    Leaves heldout.json, heldout.png and, where there is one, authors.yaml beside the diagnosis.
+    """
+    case, source, split = prepared.case, prepared.source, prepared.split
+    try:
+        diagnosis = Diagnose(case.lead).of(job, only(source, split.fit))
+    except InputError as refusal:
+        print(f"refused: {refusal}")
+        return Outcome(source.name, case.known, None, (), str(refusal))
+    errors = tuple(_errors(job, prepared, diagnosis, horizon) for horizon in case.horizons)
+    with written_together(job.out) as folder:
+        recordings = [recording.name for recording in split.held_out]
+        write_json(folder / "heldout.json", {"recordings": recordings, "errors": [asdict(e) for e in errors]})
+        _draw(job, prepared, diagnosis, folder / "heldout.png")
+        if prepared.authors is not None:
+            write_model(prepared.authors, folder / "authors.yaml")
+    return Outcome(source.name, case.known, diagnosis, errors)
+
+
+def only(source: RecordingSource, recordings: tuple[Recording, ...]) -> RecordingSource:
+    """The source of these recordings, or parts of them, alone."""
+    spans: dict[str, list[float | None]] = {
+        r.name: [float(r.t[0]), float(np.nextafter(r.t[-1], np.inf))] for r in recordings
+    }
+    return replace(source, files=list(spans), spans=spans)
+
+
+def _judge(job: Job, prepared: Prepared, horizon: float) -> Judge:
+    split = prepared.split
+    noise = sensor_noise(split.fit, prepared.source.describe().model.plant)
+    return Judge(job.part("sim"), noise, horizon, prepared.case.lead)
+
+
+def _errors(job: Job, prepared: Prepared, diagnosis: Diagnosis, horizon: float) -> HeldOutErrors:
+    judge, held_out = _judge(job, prepared, horizon), prepared.split.held_out
+    found, _ = judge.compare(diagnosis.nominal, diagnosis.model, held_out, held_out=True)
+    authors: Mapping[str, float] | None = None
+    if prepared.authors is not None:
+        authors = judge.compare(diagnosis.nominal, prepared.authors, held_out, held_out=True)[0].completed
+    return HeldOutErrors(horizon, found.nominal, found.completed, authors, found.noise_floor)
+
+
+def _draw(job: Job, prepared: Prepared, diagnosis: Diagnosis, path: Path) -> None:
+    """The picture of a diagnosis, with predictions of the held-out recordings instead of those that it saw."""
+    from wipx.report.diagnosis_figure import draw_diagnosis
+
+    judge = _judge(job, prepared, prepared.case.horizons[0])
+    errors, traces = judge.compare(diagnosis.nominal, diagnosis.model, prepared.split.held_out, held_out=True)
+    draw_diagnosis(replace(diagnosis, held_out=errors, traces=traces), path)

@@ -1,0 +1,138 @@
+"""`task=real_recordings`: recordings of real hardware, diagnosed without what their authors know."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wipx.core.diagnosis import FoundEffect
+from wipx.core.errors import InputError
+from wipx.core.model import Model
+from wipx.core.plant import plant_of
+from wipx.core.recording import Recording
+from wipx.recordings.source import RecordingSource
+from wipx.tasks.real_recordings import Case, only
+from wipx.tasks.real_table import HEAD, Outcome, cells, markdown, score
+
+RESULTS = {
+    "authors.yaml",
+    "diagnosis.json",
+    "diagnosis.png",
+    "heldout.json",
+    "heldout.png",
+    "model.yaml",
+    "report.html",
+}
+
+
+def found(name: str, *equivalent: str) -> FoundEffect:
+    return FoundEffect(name, "", "", False, (), equivalent, (), 100.0, 0.9, 0.99, 1.0, None)
+
+
+def test_a_tie_is_told_from_a_name():
+    known = {"pitch/coulomb": "F_c = 1 N m", "actuator/offset": "-0.1 N m"}
+    effects = (found("pitch/coulomb"), found("sensor_theta/bias", "actuator/offset"), found("actuator/delay"))
+    assert score(known, effects) == "1 of 2, 1 tied, 2 beside"
+
+
+def test_nothing_found_names_nothing():
+    assert score({"pitch/coulomb": "F_c = 1 N m"}, ()) == "0 of 1"
+
+
+def test_a_refusal_stays_in_the_table():
+    refused = Outcome("Rig", {"pitch/coulomb": "F_c = 1 N m"}, None, (), "the recordings contradict its sign of u")
+    assert cells(refused)[2] == "no answer: the recordings contradict its sign of u"
+    head, rule, row = markdown([refused]).splitlines()
+    assert head.count("|") == rule.count("|") == row.count("|") == len(HEAD) + 1
+
+
+def pendulum() -> Model:
+    plant = plant_of("pendulum")
+    parameters = plant.complete({"body_mass": 0.5, "com_height": 0.1, "body_inertia": 0.0}, "test")
+    return Model(plant, parameters, {"pitch/viscous": {"sigma": 0.1}})
+
+
+def test_the_authors_model_changes_and_joins_the_nominal_one():
+    nominal = pendulum()
+    effects = {"pitch/viscous": {"sigma": 0.2}, "pitch/coulomb": {"F_c": 0.3}}
+    authors = Case("rig", {}, authors={"parameters": {"body_mass": 0.6}, "effects": effects})
+    model = authors.authors_model(nominal, "task.cases.rig.authors")
+    assert model is not None
+    assert dict(model.parameters) == {**nominal.parameters, "body_mass": 0.6}
+    assert {name: dict(values) for name, values in model.effects.items()} == effects
+    assert nominal.value("pitch/viscous.sigma") == 0.1
+
+
+def test_without_a_published_model_there_is_none():
+    assert Case("rig", {}).authors_model(pendulum(), "task.cases.rig.authors") is None
+
+
+def test_a_mistyped_authors_model_names_its_key():
+    case = Case("rig", {}, authors={"effects": {"pitch/coulom": {"F_c": 0.3}}})
+    with pytest.raises(InputError, match=r"task\.cases\.rig\.authors.*did you mean pitch/coulomb"):
+        case.authors_model(pendulum(), "task.cases.rig.authors")
+
+
+def test_a_case_widens_the_uncertainty_of_a_dataset():
+    robot = {"plant": "pendulum", "uncertainty": {"body_inertia": 0.3}}
+    chosen = Case("rig", {}, uncertainty={"com_height": 0.1}).of(RecordingSource(robot=robot))
+    assert chosen.robot is not None
+    assert chosen.robot["uncertainty"] == {"body_inertia": 0.3, "com_height": 0.1}
+    assert robot["uncertainty"] == {"body_inertia": 0.3}
+
+
+def test_the_diagnosis_is_given_the_rows_to_fit_alone(folder):
+    source = RecordingSource(path=str(folder.path), held_out=0.3)
+    split = source.split(source.load())
+    seen = only(source, split.fit).load()
+    assert [r.name for r in seen] == [r.name for r in split.fit]
+    for loaded, fit in zip(seen, split.fit, strict=True):
+        np.testing.assert_array_equal(loaded.t, fit.t)
+    held = only(source, split.held_out).load()
+    assert isinstance(held[0], Recording)
+    assert held[0].t[0] > seen[0].t[-1]
+
+
+def test_an_unknown_case_is_refused(program):
+    answer = program("+experiment=real_recordings", "task.only=[tuee]", "hydra.run.dir=out")
+    assert answer.status == 2
+    assert "did you mean tue?" in answer.error
+
+
+def test_missing_recordings_are_named_in_one_line_with_their_origins(
+    program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.setenv("WIPX_RECORDINGS", str(tmp_path / "nowhere"))
+    answer = program("+experiment=real_recordings", "hydra.run.dir=out")
+    assert answer.status == 2
+    assert len(answer.error.strip().splitlines()) == 1
+    for part in ("energy_shaping_swingup.csv", "xl330_*.csv", "github.com/Rhoban/bam", "WIPX_RECORDINGS=FOLDER"):
+        assert part in answer.error
+    assert answer.error.count("github.com/pichim/Mini_Segway") == 2
+    assert not (tmp_path / "out" / "table.md").exists()
+
+
+@pytest.mark.slow
+def test_a_real_pendulum_is_diagnosed_and_its_row_written(
+    program, recordings_root: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.setenv("WIPX_RECORDINGS", str(recordings_root))
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- table: begin -->\nold\n<!-- table: end -->\nafter\n")
+    chosen = ("task.only=[dfki]", f"task.page={page}")
+    answer = program("+experiment=real_recordings", *chosen, "sim.threads=1", "hydra.run.dir=out")
+    assert (answer.status, answer.error) == (0, "")
+    assert {path.name for path in (tmp_path / "out" / "dfki").iterdir()} >= RESULTS
+    written = page.read_text()
+    assert written.startswith("before\n")
+    assert written.endswith("after\n")
+    assert "old" not in written
+    assert "Torque-limited pendulum (DFKI)" in written
+    held_out = json.loads((tmp_path / "out" / "dfki" / "heldout.json").read_text())
+    assert held_out["recordings"] == ["constant_torque_0p9Nm.csv"]
+    (errors,) = held_out["errors"]
+    assert errors["horizon"] == 0.5
+    assert errors["noise_floor"]["theta"] < errors["completed"]["theta"]
+    assert errors["noise_floor"]["theta"] < errors["authors"]["theta"]
+    assert errors["completed"]["theta"] < 1.2 * errors["nominal"]["theta"]  # the decay says little of the swing-up

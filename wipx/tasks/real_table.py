@@ -1,0 +1,111 @@
+"""The table of `task=real_recordings`: what authors know of their robots, and what was found blind."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from wipx.core.diagnosis import Diagnosis, FoundEffect
+from wipx.report.diagnosis_words import value_in_words
+from wipx.report.numbers import compact
+
+HEAD = (
+    "recordings",
+    "the authors found",
+    "found blind",
+    "known effects named",
+    "verdict",
+    "horizon",
+    "error before",
+    "after",
+    "the authors' full model",
+    "sensor noise",
+)
+
+
+@dataclass(frozen=True)
+class HeldOutErrors:
+    """Errors of predictions of one horizon, root mean square by column [SI], on recordings that no fit saw.
+
+    Attributes:
+        horizon: Length of a prediction [s].
+        nominal: Of the model that the diagnosis started from.
+        completed: Of the model that it ended with.
+        authors: Of the authors' full model; None where they published none.
+        noise_floor: Of a perfect model, from the sensor noise.
+    """
+
+    horizon: float
+    nominal: Mapping[str, float]
+    completed: Mapping[str, float]
+    authors: Mapping[str, float] | None
+    noise_floor: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a case.
+
+    Attributes:
+        title: Of the dataset.
+        known: What the authors found missing, by "site/kind", with their figure in words.
+        diagnosis: The answer; None where the diagnosis refused the recordings.
+        errors: One entry per horizon; empty without an answer.
+        refusal: Why there is no answer; empty where there is one.
+    """
+
+    title: str
+    known: Mapping[str, str]
+    diagnosis: Diagnosis | None
+    errors: tuple[HeldOutErrors, ...]
+    refusal: str = ""
+
+
+def markdown(outcomes: Sequence[Outcome]) -> str:
+    """All outcomes as one Markdown table."""
+    lines = [HEAD, ("---",) * len(HEAD), *map(cells, outcomes)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def cells(outcome: Outcome) -> tuple[str, ...]:
+    """An outcome as cells under `HEAD`."""
+    known = _stacked(f"{name}: {figure}" for name, figure in outcome.known.items())
+    if outcome.diagnosis is None:
+        return (outcome.title, known, f"no answer: {outcome.refusal}", *("-",) * (len(HEAD) - 3))
+    effects, units = outcome.diagnosis.effects, outcome.diagnosis.units
+    return (
+        outcome.title,
+        known,
+        _stacked(map(_shown, effects)) or "nothing",
+        score(outcome.known, effects),
+        outcome.diagnosis.verdict,
+        _stacked(f"{e.horizon:g} s" for e in outcome.errors),
+        _stacked(_in_units(e.nominal, units) for e in outcome.errors),
+        _stacked(_in_units(e.completed, units) for e in outcome.errors),
+        _stacked("-" if e.authors is None else _in_units(e.authors, units) for e in outcome.errors),
+        _stacked(_in_units(e.noise_floor, units) for e in outcome.errors),
+    )
+
+
+def score(known: Mapping[str, str], found: tuple[FoundEffect, ...]) -> str:
+    """How many of the known effects were named, how many more only as a tie, and how many other effects were named."""
+    names = {effect.name for effect in found}
+    ties = {name for effect in found for name in effect.equivalent} - names
+    counts = [f"{len(names & known.keys())} of {len(known)}"]
+    if ties & known.keys():
+        counts.append(f"{len(ties & known.keys())} tied")
+    if names - known.keys():
+        counts.append(f"{len(names - known.keys())} beside")
+    return ", ".join(counts)
+
+
+def _shown(effect: FoundEffect) -> str:
+    values = ", ".join(value_in_words(number) for number in effect.parameters)
+    alike = f" (or {', '.join(effect.equivalent)})" if effect.equivalent else ""
+    return f"{effect.name}{alike}: {values}"
+
+
+def _in_units(errors: Mapping[str, float], units: Mapping[str, str]) -> str:
+    return ", ".join(f"{column} {compact(error, 3)} {units[column]}" for column, error in errors.items())
+
+
+def _stacked(lines: Iterable[str]) -> str:
+    return "<br>".join(lines)
