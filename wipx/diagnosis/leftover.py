@@ -1,8 +1,9 @@
 """What a fit leaves over: forces of any shape, tested on its innovations.
 
 Score tests of forces over position, speed, angle, command and time, of dry friction that changes over position,
-command or time, of a command whose gain drifts and of resonances, on each joint (after Kristensen, Madsen, Jorgensen 2004, and the model-error models of
-Ljung 1999, System Identification, sec. 16.6). They say whether something is left, where, and what it looks like.
+command or time, of a command whose gain drifts and of resonances, on each joint (after Kristensen, Madsen, Jorgensen
+2004, and the model-error models of Ljung 1999, System Identification, sec. 16.6). They say whether something is left,
+where, and what it looks like.
 """
 
 from dataclasses import dataclass

@@ -16,7 +16,7 @@ EFFECT = Effect(
     sites=JOINT_SITES,
     parameters=(
         Parameter("signal", "0, 1 coordinates, 2, 3 rates, 4, 5 commands, 6 time", "ratio", 0.0, 0.0, 6.0, 0.0),
-        Parameter("factor", "0 for a force, 1 for a share of the command, -1 for dry friction", "ratio", 0.0, -1.0, 1.0, 0.0),
+        Parameter("factor", "0: a force, 1: share of the command, -1: dry friction", "ratio", 0.0, -1.0, 1.0, 0.0),
         Parameter("low", "first knot, in the unit of the signal", "ratio", 0.0, -HIGHEST, HIGHEST, 0.0),
         Parameter("high", "last knot", "ratio", 1.0, -HIGHEST, HIGHEST, 1.0),
         *(Parameter(f"f{i}", f"force at knot {i}", "force", 0.0, -2.0, 2.0, 0.0) for i in range(KNOTS)),
