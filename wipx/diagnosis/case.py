@@ -34,7 +34,7 @@ from wipx.diagnosis.observer import NoiseLevels
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.sanity import check_plausible
 from wipx.diagnosis.screening import prospects
-from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.selection import LEAST_GAIN, Selection
 from wipx.diagnosis.sentence import FAR_OFF, sentence
 from wipx.diagnosis.stand_in import curve_of, with_curve
 from wipx.effects.catalogue import effect_of
@@ -196,7 +196,7 @@ class _Case:
             change = np.concatenate(with_it) - np.concatenate(without)
             irrelevant = bool(np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * self.judge.noise))
             known = row_likelihoods(self.fitter, reduced, reduced.white).sum(axis=1)
-            gain = fit.log_likelihood - reduced.log_likelihood
+            gain = selection.evidence(reduced, fit)
             # An effect that gains much and does not transfer points to something else that is missing.
             lost = float(np.sum(repeated.likelihoods - known)) <= 0.0 and gain < DOUBTFUL
             if irrelevant or lost:
@@ -226,6 +226,9 @@ class _Case:
         if named is not None and named.log_likelihood > stood_in.log_likelihood:
             named = self._without_superfluous(selection, named)
             return _Rest(named, strongest, p_value, True, resembles, np.zeros(0))
+        for effect in fit.effects:
+            if selection.evidence(self._reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
+                return self.remaining(selection, selection.without(fit, effect), shapes)
         return _Rest(stood_in, widest, p_value, True, resembles, spread)
 
     def _is_far_off(self, fit: Fit) -> bool:
@@ -254,7 +257,7 @@ class _Case:
                 hypothesis = Hypothesis.of(self.setting, (*fit.effects, prospect.effect), values)
                 best[prospect.effect] = self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
         good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
-        ordered = sorted(good, key=lambda name: -selection.score(good[name]))
+        ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
         return tuple(ordered), good[ordered[0]] if ordered else None
 
     def answer(self, selection: Selection, rest: _Rest, shapes: list[Shape]) -> Diagnosis:
@@ -331,7 +334,7 @@ class _Case:
     ) -> tuple[FoundEffect, ...]:
         fit = rest.fit
         reduced = {effect: self._reduced(selection, fit, effect) for effect in fit.effects}
-        gains = {effect: float(max(fit.log_likelihood - reduced[effect].log_likelihood, 0.0)) for effect in fit.effects}
+        gains = {effect: max(selection.evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
         total = sum(gains.values()) or 1.0
         found = []
         for effect in sorted(fit.effects, key=lambda e: -gains[e]):
@@ -386,17 +389,18 @@ class _Case:
         overstated = inflation(fit, self.log, fit.hypothesis.parameters_of(effect))
         rivals, weights = [], []
         rest = set(fit.effects) - {effect}
+        base = selection.without(fit, effect)
         for other in selection.replacements(fit, effect):
             name = next(iter(set(other.effects) - rest), effect)
             if name == effect or _is_richer(other, name, effect, self.log):
                 continue
-            if fit.log_likelihood - other.log_likelihood < CLOSE_CALL:
+            if selection.evidence(base, fit) - selection.evidence(base, other) < CLOSE_CALL:
                 again = self.fitter.polished(self.fitter.fit(other.hypothesis, fit.levels))
                 other = max(other, again, key=lambda found: found.log_likelihood)
-            loss = fit.log_likelihood - other.log_likelihood
+            loss = selection.evidence(base, fit) - selection.evidence(base, other)
             values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
             rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
-            weights.append(np.exp(min(selection.score(other) - selection.score(fit), 0.0) / overstated))
+            weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
         rivals.sort(key=lambda rival: rival.separation)
         return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 

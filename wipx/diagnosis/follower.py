@@ -14,6 +14,7 @@ from wipx.sim.analytic import AnalyticSimulator, Observer, Rollouts
 from wipx.sim.cache import cached
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
+TAPS = 3  # rows of the modelled force that a report may be made of
 DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
 
 
@@ -123,30 +124,44 @@ def _innovations(measured, coordinates, rates, channels, whitening, group, last,
 
 @cached
 def _report_errors(reported, delivered, counted, last, first, out):
-    """Reported forces minus a + b F[k] + c F[k - 1] of the modelled force F, by least squares for each model.
+    """Reported forces minus a + sum_i b_i F[k - i] of the modelled force F, by least squares for each model.
 
-    A drive's torque constant and zero are not trusted, nor the instant within a row at which it reads its current:
-    what counts is the course of the force.
+    A drive's torque constant and zero are not trusted, nor the instant at which it reads its current, up to TAPS - 1
+    rows late: what counts is the course of the force.
     """
-    inputs = reported.shape[1]
-    known = np.ones(3)
-    for i in range(inputs):
+    for i in range(reported.shape[1]):
         size = max(np.std(reported[:, i]), 1e-12)
         for p in range(delivered.shape[2]):
-            normal, right = 1e-9 * size * size * np.eye(3), np.zeros(3)
-            for r in range(delivered.shape[3]):
-                for k in range(1, last[r]):
-                    if counted[k, r]:
-                        known[1], known[2] = delivered[k, i, p, r], delivered[k - 1, i, p, r]
-                        for a in range(3):
-                            right[a] += known[a] * reported[k, i, r]
-                            for b in range(3):
-                                normal[a, b] += known[a] * known[b]
-            finite = np.all(np.isfinite(normal))
-            weights = np.linalg.solve(normal, right) if finite else np.zeros(3)
-            for r in range(delivered.shape[3]):
-                for k in range(1, last[r]):
-                    error = reported[k, i, r] - weights[0]
-                    error -= weights[1] * delivered[k, i, p, r] + weights[2] * delivered[k - 1, i, p, r]
-                    error *= 10.0 / size
-                    out[p, r, first + i, k] = min(max(error, -LARGEST), LARGEST) if finite else LARGEST
+            forces = delivered[:, i, p].T.copy()
+            weights, finite = _report_weights(reported[:, i], forces, counted, size)
+            for r in range(len(forces)):
+                errors = out[p, r, first + i]
+                errors[TAPS - 1 : last[r]] = reported[TAPS - 1 : last[r], i, r] - weights[0]
+                for tap in range(TAPS):
+                    errors[TAPS - 1 : last[r]] -= weights[1 + tap] * forces[r, TAPS - 1 - tap : last[r] - tap]
+                for k in range(TAPS - 1, last[r]):
+                    errors[k] = min(max(10.0 * errors[k] / size, -LARGEST), LARGEST) if finite else LARGEST
+
+
+@cached
+def _report_weights(reported, forces, counted, size):
+    """Zero and weights of one drive's report, and whether the modelled force is finite."""
+    normal, right = 1e-9 * size * size * np.eye(1 + TAPS), np.zeros(1 + TAPS)
+    for r in range(len(forces)):
+        begin = max(np.argmax(counted[:, r]), TAPS - 1)  # rows that count follow each other
+        end = max(begin, np.argmax(counted[:, r]) + counted[:, r].sum() - 1)  # the last row has no force
+        shown = reported[begin:end, r].copy()
+        normal[0, 0] += len(shown)
+        right[0] += shown.sum()
+        for a in range(TAPS):
+            force = forces[r, begin - a : end - a]
+            normal[0, 1 + a] += force.sum()
+            right[1 + a] += force @ shown
+            for b in range(a + 1):
+                normal[1 + b, 1 + a] += force @ forces[r, begin - b : end - b]
+    for a in range(1 + TAPS):
+        for b in range(a):
+            normal[a, b] = normal[b, a]
+    if not np.all(np.isfinite(normal)):
+        return np.zeros(1 + TAPS), False
+    return np.linalg.solve(normal, right), True

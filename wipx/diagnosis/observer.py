@@ -23,6 +23,8 @@ GRID = 0.1  # [rad] between the angles about which the body is linearised
 JITTER = 0.1  # of the mean interval, a difference that gains need not follow
 SETTLED = 1e-5  # relative change of the variances in a row, below which they are taken for constant
 UNSETTLED = 100.0  # how much noisier forces count while the state is settling
+DIFFUSE = 1e4  # how much larger the variance of the first state is, which is read off noisy, perhaps late sensors
+UNHEARD = 1e6  # variance of a sensor that tells nothing [m^2, rad^2]
 
 
 @dataclass(frozen=True)
@@ -240,6 +242,16 @@ def _seen_by(channels, late, joints):
 
 
 @cached
+def _begin(covariance, sensor, factor):
+    """Coordinates known within some noise, rates within that over 20 ms, or worse by a factor of the variance."""
+    joints = len(covariance) // 2
+    covariance[:] = 0.0
+    for j in range(joints):
+        covariance[j, j] = 9.0 * factor * sensor[j]
+        covariance[joints + j, joints + j] = 9.0 * factor * sensor[j] / 0.02**2
+
+
+@cached
 def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
     rows, recordings = place.shape
     joints = b.shape[1]
@@ -247,19 +259,20 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
     gains = np.zeros((rows, recordings, n, n))
     whitening = np.zeros((rows, recordings, m, m))
     covariance, transition, half, after = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    gain, inverse, before = np.zeros((n, m)), np.zeros((m, m)), np.zeros(n)
+    gain, inverse, before, heard = np.zeros((n, m)), np.zeros((m, m)), np.zeros(n), np.zeros(m)
     work = (np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((n, m)), np.zeros((n, n)))
     h = _seen_by(channels, late, joints)
     for r in range(recordings):
-        # The first state is read off noisy rows: coordinates within some noise, rates within that over 20 ms.
-        covariance[:] = 0.0
-        for j in range(joints):
-            covariance[j, j] = 9.0 * sensor[j]
-            covariance[joints + j, joints + j] = 9.0 * sensor[j] / 0.02**2
+        _begin(covariance, sensor, DIFFUSE)
         steady, usual = False, intervals[: last[r], r].mean()
         for k in range(last[r] + 1):
+            if k > 0 and time[k - 1, r] <= SETTLES < time[k, r]:
+                _begin(covariance, sensor, 1.0)
             if not steady:
-                _correct(covariance, h, sensor, gain, inverse, work)
+                for c in range(m):  # a late sensor shows at first what was before the recording
+                    late_by = late[channels[c]] if channels[c] < joints else 0.0
+                    heard[c] = sensor[c] if time[k, r] >= late_by else UNHEARD
+                _correct(covariance, h, heard, gain, inverse, work)
             whitening[k, r] = inverse
             for c in range(m):
                 gains[k, r, :, channels[c]] = gain[:, c]

@@ -25,9 +25,10 @@ def covariance(fit: Fit, log: Log) -> np.ndarray:
     plain = np.linalg.pinv(fit.information)
     scores = _scores(fit, log)
     sandwich = plain @ (scores.T @ scores) @ plain
-    larger = np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0)
-    scale = np.sqrt(larger * np.diag(plain))
-    correlation = plain / np.sqrt(np.outer(np.diag(plain), np.diag(plain)) + 1e-300)
+    variance = np.maximum(np.diag(plain), 1e-300)  # a number without influence may come out below zero
+    larger = np.maximum(np.diag(sandwich) / variance, 1.0)
+    scale = np.sqrt(larger * variance)
+    correlation = plain / np.sqrt(np.outer(variance, variance))
     return correlation * np.outer(scale, scale)
 
 

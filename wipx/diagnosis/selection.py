@@ -29,6 +29,7 @@ WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
+LEAST_LEAD = 2.0  # nats by which a replacement must be better
 
 
 @dataclass
@@ -55,7 +56,7 @@ class Selection:
         current = self.nominal
         while len(current.effects) < MOST_EFFECTS:
             extended = self.extensions(current)
-            best = self.preferred(extended)
+            best = self.preferred(extended, current)
             if best is not None:
                 current = self.caught_up(current, best)
             if best is None or not self.worthwhile(current, best):
@@ -64,7 +65,7 @@ class Selection:
                 if best is None:
                     break
                 added = [effect for effect in best.effects if effect not in current.effects]
-                gain = best.log_likelihood - current.log_likelihood
+                gain = self.evidence(current, best)
                 self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
                 current = self.pruned(best)
                 continue
@@ -72,28 +73,29 @@ class Selection:
             current = self.pruned(best)
         return self.exchanged(current)
 
-    def score(self, fit: Fit) -> float:
-        """Penalised log-likelihood."""
+    def evidence(self, smaller: Fit, larger: Fit) -> float:
+        """Log-likelihood that one fit has beyond another [nats].
+
+        Forces that the drives report count at most as much as the motion: what only a report shows may be the way in
+        which it is made.
+        """
+        moved = larger.motion_likelihood - smaller.motion_likelihood
+        reported = larger.colour.reported - smaller.colour.reported
+        return moved + min(reported, max(moved, 0.0))
+
+    def score(self, fit: Fit, base: Fit) -> float:
+        """Penalised evidence beyond a base."""
         own = sum(len(fit.hypothesis.parameters_of(effect)) for effect in fit.effects)
-        return fit.log_likelihood - 0.5 * own * np.log(fit.rows)
+        return self.evidence(base, fit) - 0.5 * own * np.log(fit.rows)
 
     def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
-        overstated = inflation(larger, self.fitter.follower.log, indices)
+        evidence = self.evidence(smaller, larger) / inflation(larger, self.fitter.follower.log, indices)
         penalty = 0.5 * len(indices) * np.log(larger.rows)
-        gain = larger.log_likelihood - smaller.log_likelihood
-        if gain / overstated - penalty < LEAST_GAIN:
-            return False
-        # The small print of a law is small beside the law, in the motion as well as in what the drives report.
-        moved = larger.motion_likelihood - smaller.motion_likelihood
-        reported = larger.colour.reported - smaller.colour.reported
-        least_moved = LEAST_SHARE * max(smaller.motion_likelihood - self.nominal.motion_likelihood, 0.0)
-        least_reported = LEAST_SHARE * max(smaller.colour.reported - self.nominal.colour.reported, 0.0)
-        return moved / overstated - penalty >= least_moved or reported / overstated - penalty >= max(
-            least_reported, LEAST_GAIN
-        )
+        explained = max(self.evidence(self.nominal, smaller), 0.0)
+        return evidence - penalty >= max(LEAST_GAIN, LEAST_SHARE * explained)
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""
@@ -108,7 +110,7 @@ class Selection:
             return None
         for one in extended[:PAIRED]:
             if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
-                two = self.preferred(self.extensions(one))
+                two = self.preferred(self.extensions(one), current)
                 if two is not None and self.worthwhile(current, two):
                     return two
         return None
@@ -133,15 +135,15 @@ class Selection:
         self._fits[frozenset(fit.effects)] = again
         return again
 
-    def preferred(self, fits: list[Fit]) -> Fit | None:
-        """The best fit, or a simpler one that is as good."""
+    def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
+        """The fit with the most evidence beyond a base, or a simpler one that is as good."""
         if not fits:
             return None
-        best = max(fits, key=self.score)
+        best = max(fits, key=lambda fit: self.score(fit, base))
         replaced = simpler(best, self.fitter.follower.log)
         while replaced is not None:
             found = self.fitted(replaced, best)
-            if self.score(found) < self.score(best) - self._tolerance(best):
+            if self.score(found, base) < self.score(best, base) - self._tolerance(best):
                 break
             best = found
             replaced = simpler(best, self.fitter.follower.log)
@@ -162,9 +164,7 @@ class Selection:
             smaller = self.fitted(rest, fit)
             if not self.worthwhile(smaller, fit):
                 self.considered.append(
-                    Candidate(
-                        effect, fit.log_likelihood - smaller.log_likelihood, False, "superfluous beside the others"
-                    )
+                    Candidate(effect, self.evidence(smaller, fit), False, "superfluous beside the others")
                 )
                 return self.pruned(smaller) if len(rest) > 1 else smaller
         return fit
@@ -172,11 +172,13 @@ class Selection:
     def exchanged(self, fit: Fit) -> Fit:
         """Every effect replaced by a better one, as long as there is any."""
         for _ in range(EXCHANGES):
-            best = fit
+            best, most = fit, LEAST_LEAD
             for effect in fit.effects:
-                found = self.preferred(self.replacements(fit, effect))
-                if found is not None and self.score(found) > self.score(best) + 2.0:
-                    best = found
+                base = self.without(fit, effect)
+                found = self.preferred(self.extensions(base), base)
+                lead = -np.inf if found is None else self.score(found, base) - self.score(fit, base)
+                if found is not None and lead > most:
+                    best, most = found, lead
             best = self.pruned(best)
             if best.effects == fit.effects:
                 break
@@ -185,12 +187,15 @@ class Selection:
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
         """Fits with another effect in the place of one, the best first."""
+        return self.extensions(self.without(fit, effect))
+
+    def without(self, fit: Fit, effect: str) -> Fit:
+        """The fit of the other effects."""
         rest = tuple(e for e in fit.effects if e != effect)
-        reduced = self.fitted(rest, fit) if rest else self.nominal
-        return self.extensions(reduced)
+        return self.fitted(rest, fit) if rest else self.nominal
 
     def _tolerance(self, best: Fit) -> float:
-        return max(4.0, LEAST_SHARE * (best.motion_likelihood - self.nominal.motion_likelihood))
+        return max(4.0, LEAST_SHARE * self.evidence(self.nominal, best))
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.prospects_of(fit)
@@ -201,15 +206,15 @@ class Selection:
             return []
         leading = [name for name in by_effect if by_effect[name][0].gain >= max(PROMISING * ranked[0].gain, WORTHLESS)]
         fits = [self._best_start(fit, by_effect[name][:STARTS]) for name in leading[:CONSIDERED]]
-        fits.sort(key=lambda f: -self.score(f))
-        gains = [f.log_likelihood - fit.log_likelihood for f in fits]
+        fits.sort(key=lambda f: -self.score(f, fit))
+        gains = [self.evidence(fit, f) for f in fits]
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
             close = gain >= CLOSE * max(gains) and i < POLISHED
             polished.append(self.fitter.polished(found) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
-        return sorted(polished, key=lambda f: -self.score(f))
+        return sorted(polished, key=lambda f: -self.score(f, fit))
 
     def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
         effects = (*fit.effects, starts[0].effect)
@@ -224,7 +229,7 @@ class Selection:
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:
         for found in extended:
             added = [effect for effect in found.effects if effect not in current.effects]
-            gain = found.log_likelihood - current.log_likelihood
+            gain = self.evidence(current, found)
             taken = chosen is not None and found.effects == chosen.effects
             reason = _reason(found, chosen, gain, taken=taken)
             self.considered.append(Candidate(" + ".join(added), gain, taken, reason))
