@@ -11,8 +11,8 @@ LAYERS = (
     {"core"},
     {"effects"},
     {"sim"},
-    {"concealed", "control", "identify", "learn", "hardware", "recordings", "report", "tracking"},
-    {"diagnosis"},
+    {"concealed", "control", "identify", "hardware", "recordings", "report", "tracking"},
+    {"diagnosis", "rivals"},
     {"library"},
     {"tasks"},
     {"config"},
@@ -26,7 +26,9 @@ ALLOWED_IN = {
     "omegaconf": {"config", "app", "__main__"},
     "pybullet": {"sim"},
     "mujoco": {"sim"},
-    "torch": {"learn"},
+    "torch": {"rivals"},
+    "pysindy": {"rivals"},
+    "cma": {"rivals"},
     "can": {"hardware"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.name != "__init__.py")

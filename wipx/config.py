@@ -53,6 +53,7 @@ class RunConfig:
         objective: The loss.
         target: The robot that is driven.
         controller: What drives it.
+        rival: What people would use in place of a diagnosis.
         tracking: Where runs are logged.
     """
 
@@ -72,6 +73,7 @@ class RunConfig:
     objective: Any = None
     target: Any = None
     controller: Any = None
+    rival: Any = None
     tracking: Any = None
 
 

@@ -1,7 +1,7 @@
 """`task=predict`: predictions of recordings by a model, exactly as contract section 4 has them."""
 
-from dataclasses import dataclass
-from pathlib import PurePath
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePath
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.job import Job
 from wipx.tasks.results import write_csv, write_json, written_together
 
@@ -23,9 +24,11 @@ class Predict:
 
     Attributes:
         lead: Time before a restart from which the state is estimated [s].
+        residual: A residual.npz whose learned acceleration is added to the model's; None for none.
     """
 
     lead: float = 0.3
+    residual: str | None = None
 
     def __post_init__(self) -> None:
         check_positive(lead=self.lead)
@@ -43,6 +46,10 @@ class Predict:
         recordings = source.load()
         judge = Judge(job.part("sim"), sensor_noise(recordings, model.plant), HORIZON, self.lead)
         errors, traces = judge.compare(nominal, model, recordings, held_out=True)
+        if self.residual is not None:
+            learned = replace(judge, simulator=self._learned(job.part("sim"), model, judge.noise))
+            beside, traces = learned.compare(model, model, recordings, held_out=True)
+            errors = replace(errors, completed=beside.completed, noise_floor=beside.noise_floor)
         columns = model.plant.coordinates
         with written_together(job.out) as folder:
             for trace in traces:
@@ -53,6 +60,7 @@ class Predict:
                 {
                     "schema": 1,
                     "model": str(job.model_path) if job.model_path else "nominal",
+                    "residual": self.residual,
                     "horizon_s": HORIZON,
                     "windows": errors.windows,
                     "rms": errors.completed,
@@ -63,6 +71,17 @@ class Predict:
             )
         figures = ", ".join(f"{n} {errors.completed[n]:.4g} {model.plant.unit_of(n)}" for n in columns)
         print(f"rms error of {errors.windows} predictions over {HORIZON:g} s: {figures}; written to {job.out}")
+
+    def _learned(self, simulator: AnalyticSimulator, model: Model, noise: np.ndarray) -> AnalyticSimulator:
+        """The simulator with the learned acceleration."""
+        from wipx.rivals.learned_simulator import learned_simulator
+        from wipx.rivals.network import read_network
+
+        assert self.residual is not None
+        joints = len(model.plant.joints)
+        inputs = 2 * joints + len(model.plant.commands)
+        network = read_network(Path(self.residual), features=inputs, joints=joints)
+        return learned_simulator(simulator, network, noise)
 
 
 def _rms(values: np.ndarray) -> float:
