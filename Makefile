@@ -3,10 +3,10 @@ PYTHON ?= python3
 PY := .venv/bin/python
 READY := .venv/.ready
 RECORDINGS ?=
-CASES ?= 120
+PROFILE ?= quick
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real diagnose-real concealed test test-slow check bench lock clean
+.PHONY: help setup demo real concealed test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -18,21 +18,19 @@ $(READY): requirements.lock pyproject.toml
 		{ echo "setup: $(PYTHON) is missing or older than 3.11; give a newer one with PYTHON=python3.12" >&2; exit 1; }
 	@test -x $(PY) || $(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --requirement requirements.lock
+	$(PY) -m pip install --quiet torch==2.13.0
 	$(PY) -m pip install --quiet --no-deps --editable .
 	@touch $@
 
 demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder diagnoses that robot instead
 	$(PY) -m wipx $(if $(RECORDINGS),task=diagnose "recordings.path='$(RECORDINGS)'",task=pipeline)
 
-real: $(READY)  ## identify public recordings of real robots: the table of docs/real_recordings.md and README's picture
-	$(PY) -m wipx task=real_recordings task.page=docs/real_recordings.md hydra.run.dir=runs/real
-	cp runs/real/dfki_double_friction/fit.png docs/images/real_before_after.png
+real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_recordings.md and README's picture
+	$(PY) -m wipx +experiment=real_recordings task.page=docs/real_recordings.md
+	cp runs/real_recordings/dfki_double/heldout.png docs/images/real_before_after.png
 
-diagnose-real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_diagnosis.md
-	$(PY) -m wipx task=real_diagnosis task.page=docs/real_diagnosis.md hydra.run.dir=runs/real_diagnosis
-
-concealed: $(READY)  ## diagnose 120 fresh robots with concealed physics (CASES=...): the table of docs/blind_results.md
-	$(PY) -m wipx task=concealed task.cases=$(CASES) task.page=docs/blind_results.md
+concealed: $(READY)  ## diagnose 30 fresh robots with concealed physics (PROFILE=full: 300, the table of docs/blind_results.md)
+	$(PY) -m wipx +experiment=concealed profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -m "not slow"
@@ -50,7 +48,7 @@ bench: $(READY)  ## measure speed and memory
 
 # Pins for every Python from 3.11 on and every platform; kept where they still fit, `UPGRADE=--upgrade` renews them.
 lock: $(READY)  ## renew requirements.lock after a change of pyproject.toml
-	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra bench --extra dev $(UPGRADE) \
+	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra bench --extra dev --extra rivals $(UPGRADE) \
 		--no-emit-index-url --no-emit-find-links --no-annotate --no-header --output-file requirements.lock pyproject.toml
 
 clean:  ## remove runs/, caches and .venv

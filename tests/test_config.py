@@ -14,7 +14,8 @@ from wipx.app import configuration_folder
 from wipx.config import build, typed
 from wipx.core.errors import InputError
 
-OPTIONS = sorted(path for path in configuration_folder().glob("*/*.yaml") if path.parent.name != "experiment")
+PRESETS = ("experiment", "profile")  # of several groups at once
+OPTIONS = sorted(path for path in configuration_folder().glob("*/*.yaml") if path.parent.name not in PRESETS)
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,20 @@
 """Drawn cases: reproducible, complete in the vocabulary, readable by the package."""
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wipx.concealed.cases import Choice, difference_over_noise, draw_case, noise_of, realise
+from wipx.concealed.cases import TIERS, Choice, difference_over_noise, draw_case, noise_of, realise, stratified
 from wipx.concealed.logging import record
 from wipx.concealed.oddities import draw_oddity, oddity_names
 from wipx.concealed.physics import Hidden, physics
 from wipx.concealed.robots import draw_robot, linearised
 from wipx.concealed.scenario import draw_log_settings, draw_scenario
 from wipx.concealed.sizes import Draw, consequences, draw_details, draw_values, effect_names
-from wipx.concealed.write import TRUTH, write_cases
-from wipx.core.errors import InputError
+from wipx.concealed.write import case_files, write_files
 from wipx.core.plant import PLANTS
 from wipx.recordings.source import RecordingSource
 
@@ -71,9 +71,8 @@ def test_the_controller_stabilises_the_robot(kind: str):
 
 
 def test_a_seed_gives_the_same_case_and_another_seed_another_one(fresh_seed: int):
-    tiers = ("nothing", "poor_logging")
-    once, again = (draw_case(np.random.default_rng(fresh_seed), tiers) for _ in range(2))
-    other = draw_case(np.random.default_rng(fresh_seed + 1), tiers)
+    once, again = (draw_case(np.random.default_rng(fresh_seed), "poor_logging") for _ in range(2))
+    other = draw_case(np.random.default_rng(fresh_seed + 1), "poor_logging")
     for first, second in zip((*once.visible, *once.unseen), (*again.visible, *again.unseen), strict=True):
         for name in first.columns:
             assert np.array_equal(first.columns[name], second.columns[name])
@@ -102,18 +101,38 @@ def test_a_wrong_parameter_is_listed_as_uncertain():
     assert wrong
 
 
-def test_written_cases_are_read_and_the_diagnosis_sees_no_truth(tmp_path: Path, fresh_seed: int):
-    folders = write_cases(
-        tmp_path, seed=fresh_seed, cases=2, tiers=("single_clear", "poor_logging", "wrong_parameters")
-    )
-    for folder in folders:
-        assert (folder / TRUTH).is_file()
-        assert {path.suffix for path in (folder / "visible").iterdir()} == {".csv", ".yaml"}
-        for part, fewest in (("visible", 4), ("unseen", 3)):
-            source = RecordingSource(path=str(folder / part))
-            assert len(source.load()) >= fewest
-            assert all(recording.duration > 7.0 for recording in source.load())
-            source.describe()
+@pytest.mark.parametrize("tier", ["single_clear", "poor_logging"])
+def test_written_cases_are_read_and_the_diagnosis_sees_no_truth(tmp_path: Path, tier: str, fresh_seed: int):
+    files = case_files(draw_case(np.random.default_rng(fresh_seed), tier))
+    for part, texts, fewest in (("visible", files.visible, 4), ("unseen", files.unseen, 3)):
+        write_files(tmp_path / part, texts)
+        assert {path.suffix for path in (tmp_path / part).iterdir()} == {".csv", ".yaml"}
+        source = RecordingSource(path=str(tmp_path / part))
+        assert len(source.load()) >= fewest
+        assert all(recording.duration > 7.0 for recording in source.load())
+        source.describe()
+    assert tier not in "".join(files.visible.values())
+    assert files.truth["tier"] == tier
+
+
+@pytest.mark.parametrize(("cases", "first"), [(8, 0), (30, 8), (30, 30), (300, 60), (3, 1)])
+def test_cases_are_shared_out_over_the_tiers(cases: int, first: int):
+    tiers = stratified(cases, first, tuple(TIERS), np.random.default_rng(1))
+    assert len(tiers) == cases
+    for part in (tiers, tiers[:first]):
+        if len(part) >= len(TIERS):
+            assert set(part) == set(TIERS)
+        if len(part) >= 30:
+            assert all(abs(count - len(part) * TIERS[tier]) < 2.0 for tier, count in Counter(part).items())
+
+
+def test_a_full_run_has_a_hundred_chances_of_a_false_alarm():
+    assert stratified(300, 60, tuple(TIERS), np.random.default_rng(1)).count("nothing") >= 100
+
+
+def test_the_order_of_the_tiers_is_random():
+    orders = {stratified(30, 8, tuple(TIERS), np.random.default_rng(seed)) for seed in range(5)}
+    assert len(orders) == 5
 
 
 def test_the_logged_command_is_the_mean_until_the_next_row():
@@ -127,8 +146,3 @@ def test_the_logged_command_is_the_mean_until_the_next_row():
     # momentum: what the mean command gives over each row, gaps and uneven steps included; numbers are rounded
     given = run.columns["u"][:-1] * np.diff(scenario.instants[scenario.rows])
     np.testing.assert_allclose(given, gained, atol=1e-3 * np.abs(gained).max())
-
-
-def test_an_unknown_tier_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match="single_clear"):
-        write_cases(tmp_path, seed=1, cases=1, tiers=("single",))

@@ -5,14 +5,15 @@ from typing import Any
 import pytest
 
 from wipx.concealed.score import CaseScore, UnseenErrors, failed, overlap_error, score
-from wipx.concealed.table import Count, confusions, markdown, misses, tier_scores
+from wipx.concealed.table import Count, by_contrast, by_tier, confusions, is_right, misses
 
 COULOMB = {"name": "translation/coulomb", "parameters": {"F_c": 2.0}}
 LEAN = {"name": "geometry/com_offset", "parameters": {"theta_eq": 0.02}}
 
 
 def truth(*effects: dict[str, Any], tier: str = "single_clear", **more: Any) -> dict[str, Any]:
-    plain = {"plant": "wip", "outside": None, "regions": [], "times": []}
+    contrast = {effect["name"]: {"x": 2.0, "theta": 20.0} for effect in effects}
+    plain = {"plant": "wip", "outside": None, "regions": [], "times": [], "contrast": contrast}
     return {**plain, "tier": tier, "effects": list(effects), **more}
 
 
@@ -133,17 +134,50 @@ def test_counts_have_exact_intervals():
     assert str(Count(0, 0)) == "-"
 
 
-def test_tables_name_the_tiers_and_the_misses():
+def test_physics_left_over_where_nothing_is_hidden_is_a_false_alarm():
+    assert judged(truth(tier="nothing"), answer("unexplained")).accused
+    assert judged(truth(tier="nothing"), answer("consistent")).accused is False
+    assert failed("case0001", truth(tier="nothing"), 1.0, "no answer").accused is None
+
+
+def test_error_is_removed_only_where_physics_is_hidden():
+    errors = UnseenErrors({"x": 3.0}, {"x": 1.0}, {"x": 1.0})
+    assert judged(truth(tier="nothing"), answer("consistent"), errors).removed is None
+    found = judged(truth(COULOMB), answer("mismatch", named("translation/coulomb")), errors)
+    assert found.removed == pytest.approx(1.0)
+    assert found.over_floor == pytest.approx(1.0)
+
+
+def test_the_faintest_of_several_effects_counts():
+    contrast = {"translation/coulomb": {"x": 50.0, "u": 4.0}, "geometry/com_offset": {"x": 2.0, "theta": 8.0}}
+    one = judged(truth(COULOMB, LEAN, tier="pair", contrast=contrast), answer("consistent"))
+    assert one.contrast == 8.0
+    assert [group.name for group in by_contrast([one])] == ["3 to 10"]
+    assert by_contrast([judged(truth(tier="nothing"), answer("consistent"))]) == ()
+
+
+def test_groups_count_the_tiers():
     hits = judged(truth(COULOMB), answer("mismatch", named("translation/coulomb", F_c=(2.1, 1.9, 2.3))))
     lost = failed("case0002", truth(LEAN, tier="single_weak"), 3.0, "no answer within 3 s")
-    tiers = tier_scores([hits, lost])
-    assert [tier.tier for tier in tiers] == ["single_clear", "single_weak", "all"]
+    tiers = by_tier([hits, lost])
+    assert [tier.name for tier in tiers] == ["single_clear", "single_weak", "all"]
     assert tiers[-1].exact == Count(1, 2)
     assert tiers[-1].failures == 1
-    text = markdown([hits, lost])
-    assert "case0002" in text
-    assert "case0001" not in text
+    assert misses([hits, lost]) == (lost,)
     assert confusions([hits, lost]) == {
         ("translation/coulomb", "translation/coulomb"): 1,
         ("geometry/com_offset", "no answer"): 1,
     }
+
+
+def test_false_alarms_are_worse_than_what_was_missed():
+    alarm = judged(truth(tier="nothing"), answer("mismatch", named("translation/coulomb")))
+    missed = judged(truth(COULOMB), answer("consistent"))
+    lost = failed("case0002", truth(LEAN, tier="single_weak"), 3.0, "no answer within 3 s")
+    assert misses([missed, alarm, lost]) == (lost, alarm, missed)
+
+
+def test_outside_physics_is_right_when_it_is_called_unexplained():
+    assert is_right("outside: sloshing", "unexplained")
+    assert not is_right("outside: sloshing", "pitch/viscous")
+    assert not is_right("nothing", "unexplained")

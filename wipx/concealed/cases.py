@@ -20,15 +20,15 @@ from wipx.concealed.scenario import (
 from wipx.concealed.sizes import Draw, consequences, draw_details, draw_values, effect_names, family
 from wipx.core.plant import PLANTS
 
-TIERS = {  # how often each is drawn
-    "nothing": 0.15,
-    "single_clear": 0.25,
-    "single_weak": 0.15,
-    "pair": 0.12,
-    "triple": 0.08,
-    "outside": 0.1,
-    "wrong_parameters": 0.08,
-    "poor_logging": 0.07,
+TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hold 120 chances of a false alarm
+    "nothing": 0.40,
+    "single_clear": 0.18,
+    "single_weak": 0.11,
+    "pair": 0.08,
+    "triple": 0.05,
+    "outside": 0.08,
+    "wrong_parameters": 0.05,
+    "poor_logging": 0.05,
 }
 PLANT_SHARES = {"wip": 0.6, "cartpole": 0.12, "pendulum": 0.12, "linear_axis": 0.08, "double_pendulum": 0.08}
 KNOWN_SHARE = 0.15  # of robots whose owner knows the viscous friction of a joint
@@ -107,20 +107,44 @@ class Choice:
     oddity: str | None = None
 
 
-def draw_case(rng: np.random.Generator, tiers: tuple[str, ...] = tuple(TIERS)) -> Case:
-    """A case of one of the tiers."""
+def stratified(cases: int, first: int, tiers: tuple[str, ...], rng: np.random.Generator) -> tuple[str, ...]:
+    """The tier of each case: tiers by their shares, in random order.
+
+    Every tier occurs where there are cases enough; the same holds for the first ones on their own.
+
+    Args:
+        cases: How many.
+        first: Cases at the beginning that are to be a sample of all tiers too.
+        tiers: Those to choose from, keys of `TIERS`.
+        rng: Of the order.
+    """
+    everywhere = _apportioned(cases, np.array([TIERS[tier] for tier in tiers]))
+    beginning = _apportioned(first, everywhere)
+    blocks = (np.repeat(tiers, counts) for counts in (beginning, everywhere - beginning))
+    return tuple(str(tier) for block in blocks for tier in rng.permutation(block))
+
+
+def _apportioned(seats: int, weights: np.ndarray) -> np.ndarray:
+    """Whole numbers that sum to `seats`, close to proportional; none zero where there is room and weight."""
+    due = seats * weights / weights.sum()
+    given = np.where(weights > 0, 1, 0) if seats >= np.count_nonzero(weights) else np.zeros(len(weights), dtype=int)
+    for _ in range(seats - int(given.sum())):
+        given[np.argmax(due - given)] += 1
+    return given
+
+
+def draw_case(rng: np.random.Generator, tier: str) -> Case:
+    """A case of a tier."""
     while True:
-        choice = choose(rng, tiers)
+        choice = choose(rng, tier)
         for _ in range(ATTEMPTS):
             case = realise(choice, rng)
             if case is not None:
                 return case
 
 
-def choose(rng: np.random.Generator, tiers: tuple[str, ...]) -> Choice:
-    """Tier, plant and effects; effects uniform over the plant's vocabulary."""
-    weights = np.array([TIERS[tier] for tier in tiers])
-    tier = str(rng.choice(tiers, p=weights / weights.sum()))
+def choose(rng: np.random.Generator, tier: str) -> Choice:
+    """Plant and effects; effects uniform over the plant's vocabulary."""
     plant = str(rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values())))
     if tier == "outside":
         return Choice(tier, plant, (), str(rng.choice(oddity_names(plant))))

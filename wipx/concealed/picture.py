@@ -7,6 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from wipx.concealed.table import is_right
+
 RIGHT, WRONG, MUTED, GRID = "#0072b2", "#d55e00", "#5b6470", "#e3e7eb"  # Okabe and Ito 2008
 ROW = 0.24  # [inch]
 MARGIN = 2.6  # [inch], for the names
@@ -30,8 +32,7 @@ def draw_confusions(counts: Mapping[tuple[str, str], int], path: Path) -> None:
     for (true, answered), count in counts.items():
         column, row = answers.index(answered), hidden.index(true)
         total = sum(number for (name, _), number in counts.items() if name == true)
-        outside = true.startswith("outside: ") and answered == "unexplained"
-        colour = RIGHT if true == answered or outside else WRONG
+        colour = RIGHT if is_right(true, answered) else WRONG
         axes.add_patch(_cell(column, row, colour, count / total))
         axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color="white")
     axes.set_xticks(np.arange(len(answers)), answers, rotation=90, fontsize=8, color=MUTED)

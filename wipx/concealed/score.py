@@ -3,16 +3,11 @@
 How the errors on unseen recordings are obtained is the caller's choice; tables over many cases are in `table`.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise, permutations
-from math import isfinite
-from pathlib import Path
+from math import isfinite, sqrt
 from typing import Any
-
-from wipx.concealed.write import TRUTH
-from wipx.core.errors import InputError
 
 LEAST_SHARE = 0.1  # of the mismatch that a site must be given to count as named
 
@@ -24,7 +19,7 @@ class UnseenErrors:
     Attributes:
         nominal: Of the owner's model.
         completed: Of the completed model.
-        floor: What the sensors' noise alone gives.
+        floor: What a perfect model would leave.
     """
 
     nominal: Mapping[str, float]
@@ -39,6 +34,11 @@ class UnseenErrors:
         before = sum((self.nominal[name] / floor) ** 2 - 1.0 for name, floor in self.floor.items())
         after = sum((self.completed[name] / floor) ** 2 - 1.0 for name, floor in self.floor.items())
         return 1.0 - after / before if before > 0.05 * len(self.floor) and isfinite(after) else None
+
+    def over_floor(self) -> float | None:
+        """Error of the completed model in units of the floor, root mean square over signals; None where it diverges."""
+        squares = [(self.completed[name] / floor) ** 2 for name, floor in self.floor.items()]
+        return sqrt(sum(squares) / len(squares)) if isfinite(sum(squares)) else None
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,8 @@ class CaseScore:
         plant: Kind of plant.
         truth: Hidden effects, "site/kind".
         outside: Hidden physics that the vocabulary lacks.
+        contrast: Difference that the hidden physics makes in the signal that shows it best, over the noise; of
+            several effects, that of the faintest.
         answer: Effects that were named.
         verdict: Of the diagnosis.
         exact: Whether every hidden effect was found, by its name or as an equivalent, and nothing else was named.
@@ -91,7 +93,8 @@ class CaseScore:
         parameters: Of the effects that were named as they are hidden.
         flagged: Whether outside physics was called unexplained.
         aliased: Whether outside physics was explained away by the vocabulary.
-        removed: Share of the explainable squared error on unseen recordings that is gone.
+        removed: Share of the explainable squared error on unseen recordings that is gone, where physics is hidden.
+        over_floor: Error there over what a perfect model would leave.
         seconds: Time of the diagnosis [s].
         failure: Why there is no answer; empty where there is one.
     """
@@ -101,6 +104,7 @@ class CaseScore:
     plant: str
     truth: tuple[str, ...]
     outside: str | None
+    contrast: float | None
     answer: tuple[str, ...]
     verdict: str
     exact: bool | None
@@ -113,39 +117,16 @@ class CaseScore:
     flagged: bool | None
     aliased: bool | None
     removed: float | None
+    over_floor: float | None
     seconds: float
     failure: str = ""
 
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Content of a JSON file.
-
-    Raises:
-        InputError: the file is missing or no JSON.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); draw it again") from error
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path}: no JSON (line {error.lineno}: {error.msg}); delete the file and run again"
-        ) from error
-
-
-def score_folder(folder: Path, diagnosis: Path, seconds: float, errors: UnseenErrors | None = None) -> CaseScore:
-    """Score the diagnosis.json of a case.
-
-    Args:
-        folder: Of the case, with truth.json.
-        diagnosis: The diagnosis.json.
-        seconds: Time that it took [s].
-        errors: On the unseen recordings; None where they are not known.
-
-    Raises:
-        InputError: a file is missing or no JSON.
-    """
-    return score(folder.name, read_json(folder / TRUTH), read_json(diagnosis), seconds, errors)
+    @property
+    def accused(self) -> bool | None:
+        """Whether a false alarm was raised: physics named that is not hidden, or left over where none is hidden."""
+        if self.outside is not None or self.failure:
+            return None
+        return self.false_alarms > 0 or (not self.truth and self.verdict != "consistent")
 
 
 def score(
@@ -155,7 +136,15 @@ def score(
     seconds: float,
     errors: UnseenErrors | None = None,
 ) -> CaseScore:
-    """Compare the contents of truth.json and diagnosis.json."""
+    """Compare what is hidden, see `write.truth`, with the content of diagnosis.json.
+
+    Args:
+        case: Name of the case.
+        truth: What is hidden.
+        diagnosis: What was answered.
+        seconds: Time that it took [s].
+        errors: On the unseen recordings; None where they are not known.
+    """
     hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
     named = {effect["name"]: effect for effect in diagnosis["effects"]}
     verdict, outside = diagnosis["verdict"], None if truth["outside"] is None else truth["outside"]["name"]
@@ -168,6 +157,7 @@ def score(
         plant=truth["plant"],
         truth=tuple(hidden),
         outside=outside,
+        contrast=_contrast(truth["contrast"]),
         answer=tuple(named),
         verdict=verdict,
         exact=None if outside else len(found) == len(hidden) == len(named),
@@ -179,7 +169,8 @@ def score(
         parameters=_parameters(hidden, named),
         flagged=verdict == "unexplained" if outside else None,
         aliased=verdict == "mismatch" if outside else None,
-        removed=None if errors is None else errors.removed(),
+        removed=errors.removed() if errors is not None and (hidden or outside) else None,
+        over_floor=None if errors is None else errors.over_floor(),
         seconds=seconds,
     )
 
@@ -194,6 +185,7 @@ def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) ->
         plant=truth["plant"],
         truth=hidden,
         outside=outside,
+        contrast=_contrast(truth["contrast"]),
         answer=(),
         verdict="none",
         exact=None if outside else False,
@@ -206,9 +198,14 @@ def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) ->
         flagged=False if outside else None,
         aliased=False if outside else None,
         removed=None,
+        over_floor=None,
         seconds=seconds,
         failure=failure,
     )
+
+
+def _contrast(contrast: Mapping[str, Mapping[str, float]]) -> float | None:
+    return min((max(signals.values()) for signals in contrast.values()), default=None)
 
 
 def matches(hidden: tuple[str, ...], named: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

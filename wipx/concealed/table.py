@@ -1,8 +1,10 @@
-"""Tables over many scored cases: counts with intervals, parameters, and the cases that were missed."""
+"""Figures over many scored cases: counts with intervals, by tier and by contrast, confusions and misses."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf, isfinite
 
 import numpy as np
 from scipy.stats import beta
@@ -11,6 +13,7 @@ from wipx.concealed.cases import TIERS
 from wipx.concealed.score import CaseScore, ParameterScore
 
 CONFIDENCE = 0.95
+CONTRASTS = (3.0, 10.0, 30.0, 100.0)  # edges of the bins of signal to noise
 
 
 @dataclass(frozen=True)
@@ -41,16 +44,16 @@ class Count:
 
 
 @dataclass(frozen=True)
-class TierScore:
-    """Scores of the cases of one tier.
+class GroupScore:
+    """Scores of some of the cases.
 
     Attributes:
-        tier: Its name; "all" for every case.
+        name: What they have in common; "all" for every case.
         cases: How many.
         failures: Cases without an answer.
         exact: Sets of effects that are exactly right.
         verdict: Right verdicts.
-        false_alarms: Cases in which something was named that was not hidden.
+        false_alarms: Cases in which physics was reported that is not hidden.
         site: Right sites.
         flagged: Outside physics that was called unexplained.
         aliased: Outside physics that was explained away.
@@ -59,11 +62,12 @@ class TierScore:
         region_error: Median of 1 - intersection / union for sticky spots.
         time_error: The same for events.
         removed: Median share of the explainable squared error on unseen recordings that is gone.
+        over_floor: Median error there over what a perfect model would leave.
         seconds: Median time [s].
         slowest: Longest time [s].
     """
 
-    tier: str
+    name: str
     cases: int
     failures: int
     exact: Count
@@ -77,36 +81,54 @@ class TierScore:
     region_error: float | None
     time_error: float | None
     removed: float | None
+    over_floor: float | None
     seconds: float
     slowest: float
 
 
-def tier_scores(scores: Sequence[CaseScore]) -> tuple[TierScore, ...]:
+def by_tier(scores: Sequence[CaseScore]) -> tuple[GroupScore, ...]:
     """Scores by tier, in the order of `TIERS`, and of all cases; tiers without cases are left out."""
     groups = [(tier, [one for one in scores if one.tier == tier]) for tier in TIERS]
-    return tuple(_tier_score(name, group) for name, group in [*groups, ("all", list(scores))] if group)
+    return tuple(group_score(name, group) for name, group in [*groups, ("all", list(scores))] if group)
 
 
-def _tier_score(tier: str, scores: Sequence[CaseScore]) -> TierScore:
+def by_contrast(scores: Sequence[CaseScore]) -> tuple[GroupScore, ...]:
+    """Scores of the cases with hidden physics by `CaseScore.contrast`, the faintest first; empty bins are left out."""
+    found = []
+    for low, high in pairwise((0.0, *CONTRASTS, inf)):
+        group = [one for one in scores if one.contrast is not None and low <= one.contrast < high]
+        name = f"{low:g} to {high:g}" if isfinite(high) else f"over {low:g}"
+        found += [group_score(name, group)] if group else []
+    return tuple(found)
+
+
+def group_score(name: str, scores: Sequence[CaseScore]) -> GroupScore:
+    """The score of some cases, one at least."""
     parameters = [parameter for one in scores for parameter in one.parameters]
-    return TierScore(
-        tier=tier,
+    return GroupScore(
+        name=name,
         cases=len(scores),
         failures=sum(one.failure != "" for one in scores),
         exact=_count(one.exact for one in scores),
         verdict=_count(one.verdict_right for one in scores),
-        false_alarms=_count(one.false_alarms > 0 for one in scores if one.outside is None),
+        false_alarms=_count(one.accused for one in scores),
         site=_count(one.site_right for one in scores),
         flagged=_count(one.flagged for one in scores),
         aliased=_count(one.aliased for one in scores),
         covered=_count(parameter.covered for parameter in parameters),
-        parameter_error=_median(parameter.error for parameter in parameters),
-        region_error=_median(one.region_error for one in scores),
-        time_error=_median(one.time_error for one in scores),
-        removed=_median(one.removed for one in scores),
-        seconds=_median(one.seconds for one in scores) or 0.0,
+        parameter_error=median(parameter.error for parameter in parameters),
+        region_error=median(one.region_error for one in scores),
+        time_error=median(one.time_error for one in scores),
+        removed=median(one.removed for one in scores),
+        over_floor=median(one.over_floor for one in scores),
+        seconds=median(one.seconds for one in scores) or 0.0,
         slowest=max(one.seconds for one in scores),
     )
+
+
+def nothing_hidden(scores: Sequence[CaseScore]) -> tuple[CaseScore, ...]:
+    """Cases in which the nominal model is complete."""
+    return tuple(one for one in scores if not one.truth and one.outside is None)
 
 
 def _count(answers: Iterable[bool | None]) -> Count:
@@ -114,14 +136,24 @@ def _count(answers: Iterable[bool | None]) -> Count:
     return Count(sum(known), len(known))
 
 
-def _median(values: Iterable[float | None]) -> float | None:
+def median(values: Iterable[float | None]) -> float | None:
+    """Median of the values that are known; None without any."""
     known = [value for value in values if value is not None]
     return float(np.median(known)) if known else None
 
 
 def misses(scores: Sequence[CaseScore]) -> tuple[CaseScore, ...]:
-    """Cases with a wrong set of effects, a wrong verdict or no answer."""
-    return tuple(one for one in scores if one.exact is False or not one.verdict_right)
+    """Cases with a wrong set of effects, a wrong verdict or no answer, the worst first.
+
+    First those without an answer, then false alarms (where nothing is hidden first), then what was missed although
+    it shows well.
+    """
+    wrong = [one for one in scores if one.exact is False or not one.verdict_right]
+    return tuple(sorted(wrong, key=lambda one: (one.failure == "", not one.accused, -_shows(one), one.case)))
+
+
+def _shows(one: CaseScore) -> float:
+    return inf if one.contrast is None else one.contrast
 
 
 def confusions(scores: Sequence[CaseScore]) -> Counter[tuple[str, str]]:
@@ -146,64 +178,20 @@ def confusions(scores: Sequence[CaseScore]) -> Counter[tuple[str, str]]:
     return pairs
 
 
-_COLUMNS: tuple[tuple[str, Callable[[TierScore], str]], ...] = (
-    ("tier", lambda s: s.tier),
-    ("cases", lambda s: str(s.cases)),
-    ("exact set", lambda s: str(s.exact)),
-    ("verdict right", lambda s: str(s.verdict)),
-    ("with false alarm", lambda s: str(s.false_alarms)),
-    ("site right", lambda s: str(s.site)),
-    ("flagged outside", lambda s: str(s.flagged)),
-    ("silently aliased", lambda s: str(s.aliased)),
-    ("ci95 covers", lambda s: str(s.covered)),
-    ("parameter error", lambda s: _number(s.parameter_error)),
-    ("region error", lambda s: _number(s.region_error)),
-    ("time error", lambda s: _number(s.time_error)),
-    ("error removed", lambda s: _number(s.removed)),
-    ("seconds, median (max)", lambda s: f"{s.seconds:.1f} ({s.slowest:.1f})"),
-    ("failed", lambda s: str(s.failures)),
-)
+def is_right(hidden: str, answered: str) -> bool:
+    """Whether an entry of `confusions` is a right answer."""
+    return hidden == answered or (hidden.startswith("outside: ") and answered == "unexplained")
 
 
-def markdown(scores: Sequence[CaseScore]) -> str:
-    """All tables as Markdown: tiers, parameters, misses."""
-    names = [name for name, _ in _COLUMNS]
-    tiers = [[show(tier) for _, show in _COLUMNS] for tier in tier_scores(scores)]
-    parts = [
-        "# Diagnoses of concealed physics\n",
-        "Counts as right/total = rate [exact 95 % interval]; errors are medians.\n",
-        _table(names, tiers),
-        "\n## Parameters of effects that were found\n",
-        _table(["parameter", "found", "median relative error", "ci95 covers"], _parameter_rows(scores)),
-        "\n## Misses\n",
-        _table(["case", "tier", "plant", "hidden", "answer", "verdict"], [_miss_row(one) for one in misses(scores)]),
-    ]
-    return "\n".join(parts) + "\n"
-
-
-def _parameter_rows(scores: Sequence[CaseScore]) -> list[list[str]]:
+def parameter_groups(scores: Sequence[CaseScore]) -> dict[str, list[ParameterScore]]:
+    """Identified parameters of all cases by name, sorted."""
     groups: dict[str, list[ParameterScore]] = {}
     for one in scores:
         for parameter in one.parameters:
             groups.setdefault(parameter.name, []).append(parameter)
-    return [
-        [name, str(len(group)), _number(_median(p.error for p in group)), str(_count(p.covered for p in group))]
-        for name, group in sorted(groups.items())
-    ]
+    return dict(sorted(groups.items()))
 
 
-def _miss_row(one: CaseScore) -> list[str]:
-    hidden = [*one.truth, *([] if one.outside is None else [f"outside: {one.outside}"])]
-    answer = one.failure or ", ".join(one.answer) or "nothing"
-    return [one.case, one.tier, one.plant, ", ".join(hidden) or "nothing", answer, one.verdict]
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
-
-
-def _table(names: list[str], rows: list[list[str]]) -> str:
-    lines = [names, ["---"] * len(names), *rows]
-    return "\n".join(
-        "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in line) + " |" for line in lines
-    )
+def covered(parameters: Iterable[ParameterScore]) -> Count:
+    """How many true values lie in their 95 % intervals."""
+    return _count(parameter.covered for parameter in parameters)

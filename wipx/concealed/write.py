@@ -1,57 +1,45 @@
-"""Cases on disk: FOLDER/visible, FOLDER/unseen in the format of contract section 1, and FOLDER/truth.json."""
+"""Cases as the texts of files: recordings in the format of contract section 1, and the truth."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
 import yaml
 
-from wipx.concealed.cases import TIERS, Case, draw_case
+from wipx.concealed.cases import Case
 from wipx.concealed.logging import Run
-from wipx.core.errors import unknown_name
-
-TRUTH = "truth.json"
 
 
-def write_cases(folder: Path, *, seed: int, cases: int, tiers: tuple[str, ...] = tuple(TIERS)) -> tuple[Path, ...]:
-    """Draw cases and write each to a folder of its own; returns the folders.
+@dataclass(frozen=True)
+class CaseFiles:
+    """A case on its way to disk.
 
-    The same seed gives the same cases, whatever their number.
-
-    Args:
-        folder: Takes one folder for each case.
-        seed: Of every random number.
-        cases: How many.
-        tiers: Those that may be drawn, keys of `TIERS`.
-
-    Raises:
-        InputError: a tier does not exist.
+    Attributes:
+        visible: Texts of robot.yaml and of the recordings that a diagnosis may read, by file name.
+        unseen: The same of the recordings that only the judging sees.
+        truth: What is hidden, see `truth`.
     """
-    return tuple(write_numbered(folder, seed, number, tiers) for number in range(1, cases + 1))
+
+    visible: Mapping[str, str]
+    unseen: Mapping[str, str]
+    truth: Mapping[str, object]
 
 
-def write_numbered(folder: Path, seed: int, number: int, tiers: tuple[str, ...]) -> Path:
-    """Draw case `number` of a seed and write it to a folder named after the number; returns that folder."""
-    for tier in tiers:
-        if tier not in TIERS:
-            raise unknown_name("tier", tier, TIERS, "tiers")
-    place = folder / f"case{number:04d}"
-    if not (place / TRUTH).is_file():
-        write_case(draw_case(np.random.default_rng([seed, number]), tiers), place)
-    return place
+def case_files(case: Case) -> CaseFiles:
+    """The files of a case."""
+    robot = {"robot.yaml": yaml.safe_dump(robot_file(case), sort_keys=False)}
+    visible, unseen = (
+        {**robot, **{f"r{number}.csv": _table(run) for number, run in enumerate(runs, start=1)}}
+        for runs in (case.visible, case.unseen)
+    )
+    return CaseFiles(visible, unseen, truth(case))
 
 
-def write_case(case: Case, folder: Path) -> None:
-    """Write one case; truth.json last, so that a folder that has it is whole."""
-    for name, runs in (("visible", case.visible), ("unseen", case.unseen)):
-        (folder / name).mkdir(parents=True, exist_ok=True)
-        text = yaml.safe_dump(robot_file(case), sort_keys=False)
-        (folder / name / "robot.yaml").write_text(text, encoding="utf-8")
-        for number, run in enumerate(runs, start=1):
-            _write_run(folder / name / f"r{number}.csv", run)
-    (folder / TRUTH).write_text(json.dumps(truth(case), indent=2) + "\n", encoding="utf-8")
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Write texts to a folder, which is made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name).write_bytes(text.encode("utf-8"))  # the very bytes that a commitment is made to
 
 
 def robot_file(case: Case) -> dict[str, object]:
@@ -67,7 +55,7 @@ def robot_file(case: Case) -> dict[str, object]:
 
 
 def truth(case: Case) -> dict[str, object]:
-    """Content of truth.json: what is hidden, where and when it acts, and how the runs were made."""
+    """What is hidden, where and when it acts, and how the runs were made."""
     hidden, shown = case.hidden, len(case.visible)
     oddity = hidden.oddity
     return {
@@ -101,7 +89,7 @@ def _times(effects: Mapping[str, Mapping[str, float]], runs: tuple[Run, ...]) ->
     return [{"low": begin, "high": end, "recording": f"r{i}.csv"} for i, end in enumerate(ends, start=1)]
 
 
-def _write_run(path: Path, run: Run) -> None:
+def _table(run: Run) -> str:
     columns = [values.tolist() for values in run.columns.values()]
     rows = (",".join(f"{value:.10g}" for value in row) for row in zip(*columns, strict=True))
-    path.write_text("\n".join([",".join(run.columns), *rows]) + "\n", encoding="utf-8")
+    return "\n".join([",".join(run.columns), *rows]) + "\n"

@@ -1,56 +1,84 @@
 """`task=concealed`: diagnoses of robots drawn at random, whose physics no model of this package has produced.
 
-The robots, their equations of motion and the scoring are in `wipx.concealed`.
+Three processes that do not see each other's secrets: `concealed_draw` seals what is hidden, `concealed_diagnose` sees
+recordings only, `concealed_judge` opens the seals of answered cases. This module holds the keys, in memory, and hands
+each to the judge once the digests of the case's answers are written down. Tables and page are in `concealed_page`.
 """
 
-import csv
-import io
 import multiprocessing
 import os
 import secrets
-import subprocess
+import shutil
+import signal
 import sys
-import time
-from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, fields
+import threading
+from collections.abc import Generator, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
-from wipx.concealed.cases import TIERS
-from wipx.concealed.picture import draw_confusions
-from wipx.concealed.score import CaseScore, ParameterScore, UnseenErrors, failed, read_json, score_folder
-from wipx.concealed.table import confusions, markdown, misses, tier_scores
-from wipx.concealed.write import TRUTH, write_numbered
+from wipx.concealed.cases import TIERS, stratified
+from wipx.concealed.folder import RunFolder, read_json
 from wipx.core.errors import InputError, unknown_name
+from wipx.tasks.concealed_diagnose import OURS, Diagnosers, check_methods, now
+from wipx.tasks.concealed_draw import draw_and_seal
+from wipx.tasks.concealed_judge import Opened, judge, read_opened
+from wipx.tasks.concealed_page import write_results
+from wipx.tasks.concealed_proof import Account
 from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table, write_json, written_together
+from wipx.tasks.results import write_json
 
-RESULT, SEED = "result.json", "seed.json"
+EARLIER = "earlier"  # folder that takes finished runs
+DRAWING = ".drawing"  # folder of cases that are not all sealed yet
+RUNNING = "running.pid"
+PARTS = ("recordings", "sealed", "answers", "opened")
 
-ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # a worker has one core
+
+@dataclass(frozen=True)
+class Secrets:
+    """What only this process knows while cases are diagnosed.
+
+    Attributes:
+        seed: Of all draws; None where it was lost with an earlier process.
+        given: Whether the seed was given by the user, not drawn.
+        keys: Of the seals that are not opened yet, by case.
+        pauses: How often the run was interrupted, and the keys written to disk until it went on.
+    """
+
+    seed: int | None
+    given: bool
+    keys: dict[str, str] = field(repr=False)
+    pauses: int = 0
 
 
 @dataclass(frozen=True)
 class Concealed:
-    """Draw cases, diagnose each, and count what was found.
+    """Draw cases, seal their answers, diagnose each, open the seals and count what was found.
 
-    A run that was interrupted continues in the same folder: cases with an answer are not done again.
+    An interrupted run goes on when it is started again in the same folder; a finished one is kept beside a fresh one.
 
     Attributes:
         cases: How many.
-        seed: Of the draws; None for a fresh one, or that of the run that is continued.
+        seed: Of the draws; None for a fresh one.
         workers: Processes that draw and diagnose.
         tiers: Tiers to draw from; empty for all.
+        rivals: Other methods that diagnose the same recordings, options of the group `rival`.
+        rivals_cases: On how many of the cases; a sample of all tiers.
         time_limit: For one diagnosis [s].
         page: Markdown page whose table is renewed; None for none.
     """
 
-    cases: int = 40
+    cases: int = 30
     seed: int | None = None
     workers: int = 2
     tiers: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    rivals_cases: int = 8
     time_limit: float = 900.0
     page: str | None = None
 
@@ -58,139 +86,206 @@ class Concealed:
         for name, value in (("task.cases", self.cases), ("task.workers", self.workers)):
             if value < 1:
                 raise InputError(f"{name} is {value}, expected 1 or more")
+        if self.rivals_cases < 0:
+            raise InputError(f"task.rivals_cases is {self.rivals_cases}, expected 0 or more")
         for tier in self.tiers:
             if tier not in TIERS:
                 raise unknown_name("tier", tier, TIERS, "task.tiers")
 
     def run(self, job: Job) -> None:
-        """Diagnose all cases and write the tables."""
-        seed = self._seed(job.out)
-        print(f"{self.cases} cases of seed {seed}, {self.workers} at a time; in {job.out / 'cases'}")
-        scores = sorted(self._scores(job.out / "cases", seed), key=lambda one: one.case)
-        text = markdown(scores)
-        with written_together(job.out) as folder:
-            (folder / "score.md").write_text(text, encoding="utf-8")
-            (folder / "score.csv").write_text(_csv(scores), encoding="utf-8")
-            write_json(folder / "score.json", _summary(seed, scores))
-            draw_confusions(confusions(scores), folder / "confusions.png")
-        if self.page is not None:
-            replace_table(Path(self.page), text.partition("\n")[2].strip())  # without its title
-        print(f"\n{text}\nwritten to {job.out}")
-
-    def _seed(self, out: Path) -> int:
-        """The seed that is asked for, that of the run that is continued, or a fresh one."""
-        path = out / SEED
-        begun = int(read_json(path)["seed"]) if path.is_file() else None
-        if begun is not None and self.seed not in (None, begun):
-            raise InputError(f"{path}: the cases here are of seed {begun}, not {self.seed}; set another hydra.run.dir")
-        seed = begun if begun is not None else secrets.randbits(32) if self.seed is None else self.seed
-        write_json(path, {"seed": seed})
-        return seed
-
-    def _scores(self, folder: Path, seed: int) -> Iterator[CaseScore]:
-        tiers = self.tiers or tuple(TIERS)
-        context = multiprocessing.get_context("spawn")  # compiled code and threads do not survive a fork
-        with ProcessPoolExecutor(self.workers, mp_context=context) as pool, _bar(self.cases) as bar:
-            pending: list[Future[CaseScore]] = [
-                pool.submit(draw_and_diagnose, folder, seed, number, tiers, self.time_limit)
-                for number in range(1, self.cases + 1)
-            ]
+        """Diagnose all cases and write the tables and the page."""
+        if self.page is not None and not Path(self.page).is_file():
+            raise InputError(f"task.page: there is no file {self.page}; correct it")
+        check_methods(self.rivals if self._compared else ())
+        folder = RunFolder(job.out)
+        with _alone(folder), _ended_like_interrupted():
+            held = self._resumed(folder) if folder.commitments.is_file() else self._drawn(folder)
             try:
-                for done in as_completed(pending):
-                    yield done.result()
-                    bar.update()
+                folder.keys.unlink(missing_ok=True)  # before the next diagnosis starts
+                with closing(self._opened(folder, held.keys)) as cases:
+                    for opened in cases:
+                        held.keys.pop(opened.case)
             except BaseException:
-                pool.shutdown(cancel_futures=True)
+                _keep(held, folder)
+                self._write(folder, held, None)
+                print(f"the cases that are done are in {job.out / 'index.html'}; the same command goes on", flush=True)
+                raise
+        self._write(folder, held, self.page)
+
+    def _settings(self) -> dict[str, Any]:
+        """What a run that goes on must have in common with the one that was begun."""
+        tiers, compared = self.tiers or tuple(TIERS), self._compared
+        return {
+            "cases": self.cases,
+            "tiers": list(tiers),
+            "rivals": list(self.rivals) if compared else [],
+            "rivals_cases": compared,
+        }
+
+    @property
+    def _compared(self) -> int:
+        return min(self.rivals_cases, self.cases) if self.rivals else 0
+
+    def _resumed(self, folder: RunFolder) -> Secrets:
+        """The secrets of the run in a folder; of a fresh run where that one is finished."""
+        content = read_json(folder.commitments)
+        names = [entry["case"] for entry in content["cases"]]
+        still_open = [name for name in names if not folder.opened(name).is_file()]
+        if not still_open:
+            _set_aside(folder, content["written"])
+            return self._drawn(folder)
+        if not folder.keys.is_file():
+            print(f"{len(still_open)} of {len(names)} seals stay closed: the process that held their keys was killed")
+            self._write(folder, Secrets(None, False, {}), None)
+            _set_aside(folder, content["written"])
+            return self._drawn(folder)
+        if content["settings"] != self._settings():
+            raise InputError(
+                f"{folder.commitments}: an unfinished run of other settings ({content['settings']}); "
+                "go on with those, or set another hydra.run.dir"
+            )
+        kept = read_json(folder.keys)
+        if self.seed not in (None, kept["seed"]):
+            raise InputError(f"{folder.keys}: the run here is not of seed {self.seed}; set another hydra.run.dir")
+        print(f"going on with {len(still_open)} of {len(names)} cases in {folder.path}")
+        keys = {name: kept["keys"][name] for name in still_open}
+        return Secrets(kept["seed"], kept["given"], keys, kept["pauses"])
+
+    def _drawn(self, folder: RunFolder) -> Secrets:
+        """Draw and seal all cases, and publish the commitments."""
+        unknown = [name for name in PARTS if (folder.path / name).exists()]
+        if unknown:
+            raise InputError(
+                f"{folder.path}: holds {', '.join(unknown)} but no commitments.json; set another hydra.run.dir"
+            )
+        draft = RunFolder(folder.path / DRAWING)
+        shutil.rmtree(draft.path, ignore_errors=True)  # of a run that was stopped before it was sealed
+        seed = secrets.randbits(64) if self.seed is None else self.seed
+        tiers = stratified(self.cases, self._compared, self.tiers or tuple(TIERS), np.random.default_rng(seed))
+        names = [f"case{number:04d}" for number in range(1, self.cases + 1)]
+        with _processes(self.workers) as pool:
+            begun = [
+                pool.submit(draw_and_seal, draft.path, name, tier, seed)
+                for name, tier in zip(names, tiers, strict=True)
+            ]
+            sealed = sorted(_shown(begun, "draw and seal"), key=lambda one: one.commitment.case)
+        commitments = [asdict(one.commitment) for one in sealed]
+        write_json(
+            draft.commitments, {"schema": 1, "written": now(), "settings": self._settings(), "cases": commitments}
+        )
+        for path in sorted(draft.path.iterdir(), reverse=True):  # commitments.json last
+            path.rename(folder.path / path.name)
+        draft.path.rmdir()
+        print(f"{self.cases} cases are sealed; what is hidden is fixed by {folder.commitments}")
+        return Secrets(seed, self.seed is not None, {one.commitment.case: one.key for one in sealed})
+
+    def _opened(self, folder: RunFolder, keys: dict[str, str]) -> Generator[Opened, None, None]:
+        """Let every case be diagnosed and opened."""
+        diagnosers = Diagnosers(folder, self.time_limit)
+        compared = {f"case{number:04d}" for number in range(1, self._compared + 1)}
+        with _processes(1) as judging, ThreadPoolExecutor(self.workers) as watching:
+
+            def finish(case: str, key: str) -> Opened:
+                diagnosers.answer(case, (OURS, *(self.rivals if case in compared else ())))
+                return judging.submit(judge, folder.path, case, key).result()
+
+            begun = [watching.submit(finish, case, key) for case, key in keys.items()]
+            try:
+                yield from _shown(begun, "diagnose and open")
+            except BaseException:
+                watching.shutdown(wait=False, cancel_futures=True)
+                diagnosers.stop()
                 raise
 
+    def _write(self, folder: RunFolder, held: Secrets, page: str | None) -> None:
+        names = [entry["case"] for entry in read_json(folder.commitments)["cases"]]
+        cases = [read_opened(folder.opened(name)) for name in names if folder.opened(name).is_file()]
+        account = Account(held.seed, held.given, held.pauses, len(names))
+        if cases:
+            print(write_results(folder, cases, account, None if page is None else Path(page)))
 
-def _bar(cases: int) -> tqdm:
-    return tqdm(
-        total=cases,
-        desc="cases",
+
+def _keep(held: Secrets, folder: RunFolder) -> None:
+    """Write the keys that are left to a file that only this user can read; nothing is diagnosed any more."""
+    folder.keys.touch(mode=0o600)
+    write_json(folder.keys, {"schema": 1, **asdict(held), "pauses": held.pauses + 1})
+
+
+def _set_aside(folder: RunFolder, written: str) -> None:
+    """Move a finished run to a folder of its own inside the folder."""
+    place = folder.path / EARLIER / written.replace(":", "")
+    content = [path for path in folder.path.iterdir() if path.name not in (EARLIER, RUNNING)]
+    place.mkdir(parents=True)
+    for path in content:
+        path.rename(place / path.name)
+    print(f"the finished run of {written} is now in {place}")
+
+
+@contextmanager
+def _alone(folder: RunFolder) -> Iterator[None]:
+    """Refuse to work in a folder in which another process is at work."""
+    mark = folder.path / RUNNING
+    if mark.is_file() and _lives(int(mark.read_text(encoding="utf-8"))):
+        raise InputError(f"{mark}: another process is at work on this run; wait for it, or set another hydra.run.dir")
+    mark.write_text(str(os.getpid()), encoding="utf-8")
+    try:
+        yield
+    finally:
+        mark.unlink(missing_ok=True)
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+@contextmanager
+def _processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that are asked to stop by this one alone; jobs that have not begun are dropped then."""
+    context = multiprocessing.get_context("spawn")  # compiled code and threads do not survive a fork
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_ignore_interrupts)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _ended_like_interrupted() -> Iterator[None]:
+    """Let a request to end (SIGTERM) be met like Ctrl-C, so that the keys are kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _shown(begun: list[Future[Any]], label: str) -> Iterator[Any]:
+    """Results as they come, with a bar that tells the time left."""
+    with tqdm(
+        total=len(begun),
+        desc=label,
         bar_format="{desc} |{bar:24}| {n_fmt}/{total_fmt}, {elapsed} gone, about {remaining} left",
         file=sys.stderr,
         leave=False,
         disable=None,
-    )
-
-
-def draw_and_diagnose(folder: Path, seed: int, number: int, tiers: tuple[str, ...], time_limit: float) -> CaseScore:
-    """The score of one case; drawn and diagnosed unless its answer is there."""
-    place = write_numbered(folder, seed, number, tiers)
-    if (place / RESULT).is_file():
-        scored = _read_score(place / RESULT)
-        if not scored.failure:
-            return scored
-    scored = diagnose_case(place, time_limit)
-    write_json(place / RESULT, asdict(scored))
-    return scored
-
-
-def diagnose_case(folder: Path, time_limit: float) -> CaseScore:
-    """Diagnose a case's visible recordings, predict its unseen ones, and score both."""
-    answer = folder / "answer"
-    begun = time.perf_counter()
-    failure = _call("diagnose", folder / "visible", answer, time_limit)
-    seconds = time.perf_counter() - begun
-    if failure:
-        return failed(folder.name, read_json(folder / TRUTH), seconds, failure)
-    return score_folder(folder, answer / "diagnosis.json", seconds, _unseen_errors(folder, answer, time_limit))
-
-
-def _unseen_errors(folder: Path, answer: Path, time_limit: float) -> UnseenErrors | None:
-    """Errors of both models on the unseen recordings; None where they cannot be predicted."""
-    model = f"model.path='{answer / 'model.yaml'}'"
-    if _call("predict", folder / "unseen", folder / "prediction", time_limit, model):
-        return None
-    metrics = read_json(folder / "prediction" / "metrics.json")
-    # the sensors' noise is known; what it does to the state from which a prediction starts comes on top
-    sensors, propagated = read_json(folder / TRUTH)["noise"], metrics["noise_floor"]
-    floor = {name: max(noise, propagated[name] or 0.0) for name, noise in sensors.items()}
-    return UnseenErrors(metrics["rms_nominal"], metrics["rms"], floor)
-
-
-def _call(task: str, recordings: Path, out: Path, time_limit: float, *more: str) -> str:
-    """Run a task of this program; returns why it failed, empty where it did not."""
-    command = [sys.executable, "-m", "wipx", f"task={task}", "tracking=none", "sim.threads=1"]
-    command += [f"recordings.path='{recordings.resolve()}'", f"hydra.run.dir='{out.resolve()}'", *more]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=time_limit, check=False, env=ONE_THREAD)
-    except subprocess.TimeoutExpired:
-        return f"no answer within {time_limit:g} s"
-    if done.returncode == 0:
-        return ""
-    lines = done.stderr.strip().splitlines() or ["no message"]
-    return f"exit status {done.returncode}: {lines[-1]}"
-
-
-def _read_score(path: Path) -> CaseScore:
-    data = read_json(path)
-    for name in ("truth", "answer"):
-        data[name] = tuple(data[name])
-    data["parameters"] = tuple(ParameterScore(**one) for one in data["parameters"])
-    return CaseScore(**data)
-
-
-def _summary(seed: int, scores: list[CaseScore]) -> dict[str, object]:
-    return {
-        "schema": 1,
-        "seed": seed,
-        "tiers": [asdict(tier) for tier in tier_scores(scores)],
-        "misses": [one.case for one in misses(scores)],
-        "cases": [asdict(one) for one in scores],
-    }
-
-
-def _csv(scores: list[CaseScore]) -> str:
-    """One line for each case; names joined by spaces, parameters as name=value(true)."""
-    text = io.StringIO()
-    names = [field.name for field in fields(CaseScore)]
-    writer = csv.DictWriter(text, names, lineterminator="\n")
-    writer.writeheader()
-    for one in scores:
-        row = {name: value for name, value in asdict(one).items() if value is not None}
-        row |= {"truth": " ".join(one.truth), "answer": " ".join(one.answer)}
-        row["parameters"] = " ".join(f"{p.name}={p.value:.6g}({p.true:.6g})" for p in one.parameters)
-        writer.writerow(row)
-    return text.getvalue()
+    ) as bar:
+        for done in as_completed(begun):
+            yield done.result()
+            bar.update()

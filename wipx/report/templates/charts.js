@@ -226,7 +226,7 @@ function start(draw) {
   }
   const drawAll = () => {
     if (select) drawTrace();
-    drawErrors();
+    if (data.errors) drawErrors();
     draw();
   };
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
