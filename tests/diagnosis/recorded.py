@@ -102,7 +102,8 @@ def dropped(recordings: Recordings, rng: np.random.Generator) -> Recordings:
 
 def jittered(recordings: Recordings, rng: np.random.Generator) -> Recordings:
     """Logged at every second row on average, sometimes at the next or the one before."""
-    return tuple(thinned(r, np.cumsum(rng.choice((1, 2, 2, 3), len(r) // 2 - 10))) for r in recordings)
+    kept = [np.cumsum(rng.choice((1, 2, 2, 3), len(r) // 2)) for r in recordings]
+    return tuple(thinned(r, k[k < len(r)]) for r, k in zip(recordings, kept, strict=True))
 
 
 def slow(recordings: Recordings, rng: np.random.Generator) -> Recordings:
