@@ -55,3 +55,10 @@ def test_a_repeated_command_tells_nothing():
     echo = tuple(Recording(r.name, {**r.columns, "u_measured": 0.9 * r["u"]}, r.source) for r in plain.recordings)
     assert plain.log.reported.shape[1] == 0
     assert Bench(plain.nominal, echo, {}).log.reported.shape[1] == 0
+
+
+@pytest.mark.parametrize("kind", ["wip", "linear_axis"])
+def test_a_report_that_comes_late_is_no_late_drive(kind: str, fresh_seed: int):
+    plain = bench(kind, {}, fresh_seed)
+    late = reporting(plain.recordings, np.random.default_rng(fresh_seed), delay=0.005)  # more than a row
+    assert Bench(plain.nominal, late, {}).diagnosed().verdict == "consistent"
