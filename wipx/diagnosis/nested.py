@@ -14,6 +14,7 @@ CONTAINS = {  # rich law: the simple one that it can always imitate
     "speed_limit": "saturation",
     "payload_event": "payload",
 }
+SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
 BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
 CERTAIN = 2.0  # standard deviations
@@ -30,6 +31,17 @@ def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
             if len(set(rest)) == len(rest):
                 return rest
     return None
+
+
+def simple_values(fit: Fit) -> dict[str, float]:
+    """Numbers of the fit's rich laws as those of the simple ones that they contain."""
+    found = {}
+    for name, value in fit.hypothesis.values.items():
+        effect, _, symbol = name.rpartition(".")
+        site, _, kind = effect.partition("/")
+        if kind in CONTAINS:
+            found[f"{site}/{CONTAINS[kind]}.{SYMBOLS.get(symbol, symbol)}"] = value
+    return found
 
 
 def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:

@@ -25,11 +25,11 @@ def covariance(fit: Fit, log: Log) -> np.ndarray:
     plain = np.linalg.pinv(fit.information)
     scores = _scores(fit, log)
     sandwich = plain @ (scores.T @ scores) @ plain
-    variance = np.maximum(np.diag(plain), 1e-300)  # a number without influence may come out below zero
-    larger = np.maximum(np.diag(sandwich) / variance, 1.0)
-    scale = np.sqrt(larger * variance)
-    correlation = plain / np.sqrt(np.outer(variance, variance))
-    return correlation * np.outer(scale, scale)
+    # a number without influence may come out a little below zero
+    larger = np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0)
+    found = plain * np.sqrt(np.outer(larger, larger))
+    found[np.diag_indices_from(found)] = np.maximum(np.diag(found), 0.0)
+    return found
 
 
 def inflation(fit: Fit, log: Log, indices: list[int]) -> float:

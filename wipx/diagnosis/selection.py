@@ -13,7 +13,7 @@ import numpy as np
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.nested import simpler
+from wipx.diagnosis.nested import simple_values, simpler
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import Prospect, prospects
 
@@ -81,7 +81,7 @@ class Selection:
         """
         moved = larger.motion_likelihood - smaller.motion_likelihood
         reported = larger.colour.reported - smaller.colour.reported
-        return moved + min(reported, max(moved, 0.0))
+        return float(moved + min(reported, max(moved, 0.0)))
 
     def score(self, fit: Fit, base: Fit) -> float:
         """Penalised evidence beyond a base."""
@@ -153,7 +153,8 @@ class Selection:
         """The fit of some effects, from the values and noise of another fit on."""
         key = frozenset(effects)
         if key not in self._fits:
-            hypothesis = Hypothesis.of(self.setting, effects, start.hypothesis.values)
+            values = {**simple_values(start), **start.hypothesis.values}
+            hypothesis = Hypothesis.of(self.setting, effects, values)
             self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
         return self._fits[key]
 

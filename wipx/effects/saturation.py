@@ -8,7 +8,16 @@ EFFECT = Effect(
     kind="saturation",
     sites=("actuator",),
     parameters=(
-        Parameter("F_max", "largest force", "force", 1e9, 0.05, 2.0, 0.8, grid=(0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
+        Parameter(
+            "F_max",
+            "largest force",
+            "force",
+            1e9,
+            0.05,
+            2.0,
+            0.8,
+            grid=(0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
+        ),
     ),
     law="F = clip(u, -F_max, F_max)",
     source="force range of actuators, MuJoCo documentation",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.model import ModelBatch
+from wipx.effects.catalogue import kinds
 from wipx.effects.lagged_stribeck import lag_of
 from wipx.effects.payload import loaded
 from wipx.effects.remainder import KNOTS
@@ -47,10 +48,12 @@ class _Filler:
         return self.batch.column(name)
 
     def values(self, name: str) -> dict[str, np.ndarray] | None:
-        """Parameters of an effect as arrays (P,), or None where it is absent."""
+        """Parameters of an effect as arrays (P,), or None where it is absent; those not given have their defaults."""
         if name not in self.effects:
             return None
-        return {symbol: self.batch.column(f"{name}.{symbol}") for symbol in self.effects[name]}
+        parameters = kinds()[name.partition("/")[2]].parameters
+        found = {p.name: np.full(self.batch.size, p.default) for p in parameters if p.default is not None}
+        return found | {symbol: self.batch.column(f"{name}.{symbol}") for symbol in self.effects[name]}
 
     def add(self, name: str, flag: int | None, **targets: int) -> None:
         """Add the parameters of an effect, where present, to rows, and raise its flag."""
