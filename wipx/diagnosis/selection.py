@@ -53,8 +53,9 @@ class Selection:
 
     def run(self) -> Fit:
         """The fit of the effects that are missing; `nominal` where none is."""
-        current = self.nominal
-        while len(current.effects) < MOST_EFFECTS:
+        current, seen = self.nominal, set()
+        while len(current.effects) < MOST_EFFECTS and frozenset(current.effects) not in seen:
+            seen.add(frozenset(current.effects))  # elimination may lead back to where the search has been
             extended = self.extensions(current)
             best = self.preferred(extended, current)
             if best is not None:
