@@ -16,6 +16,7 @@ from wipx.effects.catalogue import effect_of
 NINETY_FIVE = 1.96  # standard deviations
 LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
 UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
+NUDGE = 0.05  # relative change of the spread, to see what it does
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 
@@ -27,7 +28,7 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
     chance = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
-    deviation = np.hypot(chance, shift_by_step(fitter, fit))
+    deviation = np.sqrt(chance**2 + shift_by_step(fitter, fit) ** 2 + (wider * doubt_of_spread(fitter, fit)) ** 2)
     values = space.to_values(cube)
     low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
     high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
@@ -88,6 +89,18 @@ def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
     finer = Fitter(replace(follower, simulator=replace(follower.simulator, step=0.5 * follower.simulator.step)))
     change = finer.white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
     return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
+
+
+def doubt_of_spread(fitter: Fitter, fit: Fit) -> np.ndarray:
+    """What not knowing the spread of single commands adds to the standard deviations in the cube, shape (D,)."""
+    if fit.levels.spread == 0.0 or not len(fit.hypothesis.cube):
+        return np.zeros(len(fit.hypothesis.cube))
+    wider = replace(fit, levels=replace(fit.levels, spread=(1.0 + NUDGE) * fit.levels.spread))
+    slope = (fitter.white_of(wider, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()) / NUDGE
+    jacobian = fit.jacobian[: slope.size]
+    shift = np.linalg.pinv(fit.information) @ (jacobian.T @ slope)
+    own = float(np.sum((slope - jacobian @ shift) ** 2))  # what numbers of the fit cannot imitate
+    return np.abs(shift) / np.sqrt(max(own, 1.0))
 
 
 def _meaning(model: Model, name: str) -> str:
