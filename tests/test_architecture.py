@@ -25,7 +25,7 @@ ALLOWED_IN = {
     "hydra": {"config", "app", "__main__"},
     "omegaconf": {"config", "app", "__main__"},
     "pybullet": {"sim"},
-    "mujoco": {"sim"},
+    "mujoco": {"sim", "rivals"},
     "torch": {"rivals"},
     "pysindy": {"rivals"},
     "cma": {"rivals"},
