@@ -25,7 +25,7 @@ class Log:
         measured: Recorded coordinates, then rates, shape (K + 1, 2 joints, R); zero where not recorded.
         channels: Which of these are recorded, indices (c,); coordinates always.
         reported: Forces that the drives report, shape (K + 1, i, R) [N or N m]; i is the number of commands, or zero
-            where they do not, or only repeat the command.
+            where they do not, only repeat the command, or the log has mean commands.
         left_out: A recording whose rows do not count; None for none.
     """
 
@@ -115,9 +115,13 @@ class Log:
 
 
 def _reported(recordings: tuple[Recording, ...], plant: Plant, rows: int) -> np.ndarray:
-    """What the drives say beyond the command, shape (rows, i, R)."""
+    """What the drives say beyond the command, shape (rows, i, R).
+
+    Where the log has only mean commands, the force within a row is not known well enough to be compared.
+    """
     names = tuple(f"{command}_measured" for command in plant.commands)
-    if not all(name in recording for recording in recordings for name in names):
+    averaged = any(recording.periods > 1 for recording in recordings)
+    if averaged or not all(name in recording for recording in recordings for name in names):
         return np.zeros((rows, 0, len(recordings)))
     for command, name in zip(plant.commands, names, strict=True):
         pairs = [(r[command][1:], r[command][:-1], r[name][1:]) for r in recordings]

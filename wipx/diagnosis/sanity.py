@@ -60,7 +60,7 @@ class Slip:
     def recording(self, recording: Recording) -> Recording:
         """A recording with its columns put right."""
         changed = {n: f * recording[n] + offset for n, (f, offset) in self.columns.items() if n in recording}
-        return Recording(recording.name, {**recording.columns, **changed}, recording.source)
+        return Recording(recording.name, {**recording.columns, **changed}, recording.source, recording.periods)
 
     def factors(self, log: Log) -> np.ndarray:
         """Size of the factor on each recorded channel, shape (m,)."""
