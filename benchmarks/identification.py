@@ -26,8 +26,9 @@ from wipx.identify.optimizers.least_squares import LeastSquares
 from wipx.identify.optimizers.pso import ParticleSwarm
 from wipx.identify.parameter_space import parameter_space, scales_of
 from wipx.identify.problem import WindowProblem
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import StateFeedback
 
 RECORDINGS, DURATION = 8, 1.2  # paper: trajectories of 1.2 s
 POSITION_NOISE, ANGLE_NOISE = 5e-4, 1e-3  # [m], [rad]

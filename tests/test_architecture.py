@@ -11,7 +11,8 @@ LAYERS = (
     {"core"},
     {"effects"},
     {"sim"},
-    {"concealed", "control", "identify", "hardware", "recordings", "report", "tracking"},
+    {"concealed", "control", "identify", "recordings", "report", "tracking"},
+    {"hardware"},
     {"diagnosis", "rivals"},
     {"library"},
     {"tasks"},
@@ -28,8 +29,11 @@ ALLOWED_IN = {
     "mujoco": {"sim", "rivals"},
     "torch": {"rivals"},
     "pysindy": {"rivals"},
-    "cma": {"rivals"},
+    "cma": {"identify", "rivals"},
+    "pymoo": {"identify"},
     "can": {"hardware"},
+    "cantools": {"hardware"},
+    "serial": {"hardware"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.name != "__init__.py")
 

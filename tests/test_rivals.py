@@ -103,7 +103,7 @@ def test_a_network_predicts_better_and_names_nothing(fresh_seed: int):
     assert answer.network is not None
     unseen = record(VISCOUS, rng)
     nominal, _ = Judge(SIMULATOR, given.noise, 0.5, 0.3).compare(given.nominal, given.nominal, unseen, held_out=True)
-    learned = Judge(learned_simulator(SIMULATOR, answer.network, given.noise), given.noise, 0.5, 0.3)
+    learned = Judge(learned_simulator(answer.network, given.noise), given.noise, 0.5, 0.3)
     errors, _ = learned.compare(given.nominal, given.nominal, unseen, held_out=True)
     assert errors.completed["theta"] < 0.5 * nominal.nominal["theta"]
 
@@ -154,8 +154,7 @@ def test_without_learned_acceleration_rollouts_are_those_of_the_simulator(fresh_
     rng = np.random.default_rng(fresh_seed)
     (recording,) = record(VISCOUS, rng, count=1)
     judges = (
-        Judge(s, np.array([NOISE]), 0.5, 0.3)
-        for s in (SIMULATOR, learned_simulator(SIMULATOR, silent(1, 3), np.array([NOISE])))
+        Judge(s, np.array([NOISE]), 0.5, 0.3) for s in (SIMULATOR, learned_simulator(silent(1, 3), np.array([NOISE])))
     )
     analytic, learned = (judge.predict(pendulum(VISCOUS), (recording,))[0] for judge in judges)
     np.testing.assert_allclose(learned, analytic, atol=0.1 * NOISE)

@@ -11,7 +11,8 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.case import Robot, diagnose
 from wipx.recordings.robot_file import RobotDescription, read_robot
 from wipx.recordings.source import RecordingSource
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import StateFeedback
 
 
 def diagnose_robot(

@@ -10,7 +10,7 @@ from wipx.core.plant import plant_of
 from wipx.effects.catalogue import check_together, effect_of
 from wipx.hardware import testbed
 from wipx.hardware.testbed import EmulatedTestbed
-from wipx.sim.analytic import StateFeedback
+from wipx.sim.simulator import StateFeedback
 
 NAMES = tuple(f"r{i}" for i in range(6))
 TESTBED = EmulatedTestbed("wip", {**PARAMETERS["wip"], "body_mass": 5.0, "body_inertia": 0.15}, duration=1.5)

@@ -14,8 +14,9 @@ from wipx.identify.identification import Identified, Request, identify
 from wipx.identify.objectives import MultiStep, Objective
 from wipx.identify.optimizers.least_squares import LeastSquares
 from wipx.identify.optimizers.search import Optimizer
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import StateFeedback
 
 Effects = Mapping[str, Mapping[str, float]]
 

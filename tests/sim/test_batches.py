@@ -5,8 +5,9 @@ import pytest
 from sim.robots import Effects, robot
 
 from wipx.core.model import Model, ModelBatch
-from wipx.sim.analytic import AnalyticSimulator, Rollouts, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Rollouts, StateFeedback
 
 EVERYTHING: Effects = {
     "translation/viscous": {"sigma": 1.0},

@@ -6,8 +6,9 @@ from sim.robots import robot
 
 from wipx.control.lqr import Lqr
 from wipx.core.model import Model, ModelBatch
-from wipx.sim.analytic import AnalyticSimulator, Rollouts, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Rollouts, StateFeedback
 
 LOOP = Inputs.regular(4.0, 500.0, 1)
 ROWS = len(LOOP.t) - 1

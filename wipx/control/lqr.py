@@ -7,7 +7,7 @@ import numpy as np
 from wipx.control.linearise import linearise
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
-from wipx.sim.analytic import StateFeedback
+from wipx.sim.simulator import StateFeedback
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,8 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import StateFeedback
 
 HORIZON = 0.5  # [s] of predictions, contract section 4
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart

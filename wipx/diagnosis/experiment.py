@@ -18,7 +18,8 @@ from wipx.diagnosis.log import Log
 from wipx.diagnosis.menu import Reach, how, menu, prescribed
 from wipx.diagnosis.robust import covariance, inflation
 from wipx.diagnosis.trial import EVENT, Bench, Trial, loaded
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import StateFeedback
 
 MOST_RIVALS = 3
 STEPS = 3  # of a rival's fit to a simulated run

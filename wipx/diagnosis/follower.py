@@ -10,8 +10,9 @@ from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
 from wipx.diagnosis.whiteness import LARGEST
 from wipx.identify.prediction import true_state
-from wipx.sim.analytic import AnalyticSimulator, Observer, Rollouts
+from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
+from wipx.sim.simulator import Rollouts
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
 TAPS = 3  # rows of the modelled force that a report may be made of

@@ -10,8 +10,9 @@ from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.menu import DURATION, Excitation, Reach, payload_height, rate_of
 from wipx.diagnosis.observer import NoiseLevels
-from wipx.sim.analytic import AnalyticSimulator, Rollouts, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Rollouts, StateFeedback
 
 FURTHER = 2.0  # times the recorded travel that an experiment may take
 STRONGER = 1.4  # times the largest recorded command

@@ -13,8 +13,9 @@ from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import StateFeedback
 
 FALLEN = 1.0  # [rad]
 

@@ -11,8 +11,8 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.recording import Recording
 from wipx.identify.parameter_space import ParameterSpace
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Simulator, StateFeedback
 
 FELL_OVER = 1e3  # [m, rad]; what a trajectory that diverged counts
 SLOPE_STEP = 1e-4  # of the search interval
@@ -36,7 +36,7 @@ class ClosedLoopProblem:
     """
 
     space: ParameterSpace
-    simulator: AnalyticSimulator
+    simulator: Simulator
     feedback: StateFeedback
     inputs: Inputs
     initial: np.ndarray
@@ -51,7 +51,7 @@ class ClosedLoopProblem:
         cls,
         recordings: tuple[Recording, ...],
         space: ParameterSpace,
-        simulator: AnalyticSimulator,
+        simulator: Simulator,
         feedback: StateFeedback,
         rate: float,
         *,
@@ -106,7 +106,7 @@ class ClosedLoopProblem:
     def smoothed(self, level: float) -> "ClosedLoopProblem":
         """The same problem with dry friction that builds up over a share `level` of the joints' speeds."""
         smoothing = tuple(level * speed for speed in self.speeds)
-        return replace(self, simulator=replace(self.simulator, smoothing=smoothing))
+        return replace(self, simulator=self.simulator.smoothed(smoothing))
 
     def losses(self, cube: np.ndarray) -> np.ndarray:
         """Eq. 7 with the mean square for d: shape (P,) [m^2 and rad^2 added]."""

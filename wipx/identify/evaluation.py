@@ -10,7 +10,7 @@ from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
 from wipx.identify.prediction import Predictor
 from wipx.identify.windows import Windows, cut
-from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import Simulator
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Judge:
         lead: Time before a window's start from which its state is estimated [s].
     """
 
-    simulator: AnalyticSimulator
+    simulator: Simulator
     noise: np.ndarray
     horizon: float
     lead: float

@@ -17,7 +17,7 @@ from wipx.identify.objectives import FitData, Objective
 from wipx.identify.optimizers.search import Minimum, Optimizer, Watcher, unwatched
 from wipx.identify.parameter_space import ParameterSpace, parameter_space, scales_of
 from wipx.identify.problem import WindowProblem
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.simulator import Simulator, StateFeedback
 
 AT_BOUND = 1e-4  # of the search interval
 ABSENT = 1e-6  # likewise, from the neutral value
@@ -72,7 +72,7 @@ class Identified:
 def identify(
     request: Request,
     split: RecordingSplit,
-    simulator: AnalyticSimulator,
+    simulator: Simulator,
     objective: Objective,
     optimizer: Optimizer,
     *,

@@ -14,7 +14,7 @@ from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.prediction import Predictor
 from wipx.identify.problem import WindowProblem
 from wipx.identify.windows import cut
-from wipx.sim.analytic import AnalyticSimulator, StateFeedback
+from wipx.sim.simulator import Simulator, StateFeedback
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class FitData:
 
     recordings: tuple[Recording, ...]
     model: Model
-    simulator: AnalyticSimulator
+    simulator: Simulator
     noise: np.ndarray
     speeds: tuple[float, ...]
     feedback: tuple[StateFeedback, float] | None

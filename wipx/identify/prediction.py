@@ -13,9 +13,9 @@ import numpy as np
 
 from wipx.core.model import ModelBatch
 from wipx.identify.windows import Windows
-from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.coefficients import coefficients
 from wipx.sim.rows import ON_FRICTION
+from wipx.sim.simulator import Simulator
 
 # The estimate first sees this much of a window [s]: an unstable plant is linear in its first
 # state only for a short time.
@@ -53,7 +53,7 @@ class Predictor:
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
     """
 
-    simulator: AnalyticSimulator
+    simulator: Simulator
     windows: Windows
     noise: np.ndarray
 
@@ -123,7 +123,7 @@ class Predictor:
         """The same, with friction that builds up over what noise feigns as speed in ten milliseconds."""
         if self.simulator.smoothing:
             return self
-        return replace(self, simulator=replace(self.simulator, smoothing=tuple((100.0 * self.noise).tolist())))
+        return replace(self, simulator=self.simulator.smoothed(tuple((100.0 * self.noise).tolist())))
 
     def residuals(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Recorded minus predicted in standard deviations of the noise, zero outside of `rows`.

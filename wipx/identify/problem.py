@@ -58,7 +58,7 @@ class WindowProblem:
     def smoothed(self, level: float) -> "WindowProblem":
         """The same problem with dry friction that builds up over a share `level` of the joints' speeds."""
         smoothing = tuple(level * speed for speed in self.speeds)
-        simulator = replace(self.predictor.simulator, smoothing=smoothing)
+        simulator = self.predictor.simulator.smoothed(smoothing)
         return replace(self, predictor=replace(self.predictor, simulator=simulator), _last=[])
 
     def losses(self, cube: np.ndarray) -> np.ndarray:

@@ -12,8 +12,9 @@ from wipx.core.model import Model, ModelBatch
 from wipx.rivals.network import ResidualAcceleration
 from wipx.rivals.rigid_body import RigidBody
 from wipx.rivals.torque import actuated, joint_forces
-from wipx.sim.analytic import AnalyticSimulator, Rollouts
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Rollouts
 
 FASTEST = 1e3  # [m/s, rad/s]; rates are held below it, so that a rollout that falls over stays a number
 
@@ -98,15 +99,12 @@ def nominal_acceleration(
     return np.linalg.solve(body.mass_matrix(t, q), forces[..., None])[..., 0].T
 
 
-def learned_simulator(
-    simulator: AnalyticSimulator, network: ResidualAcceleration, noise: np.ndarray
-) -> LearnedSimulator:
+def learned_simulator(network: ResidualAcceleration, noise: np.ndarray) -> LearnedSimulator:
     """A simulator with a learned acceleration.
 
     Args:
-        simulator: Whose settings it takes.
         network: The acceleration.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad]; what it feigns as speed in ten
             milliseconds counts as rest.
     """
-    return LearnedSimulator(simulator.step, simulator.threads, (), network, tuple((100.0 * noise).tolist()))
+    return LearnedSimulator(network=network, rest_speeds=tuple((100.0 * noise).tolist()))

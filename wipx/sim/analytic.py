@@ -8,7 +8,7 @@ that are Python objects drive the same code row by row (`drive`).
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,45 +20,12 @@ from wipx.sim.coefficients import coefficients, joint_index
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
 from wipx.sim.rows import W
+from wipx.sim.simulator import Rollouts, StateFeedback
 
 LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
 NO_FEEDBACK = np.zeros((1, 4, 1))
 HELD = np.zeros((1, 2, 1))
 NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
-
-
-@dataclass(frozen=True)
-class Rollouts:
-    """What P models did on R windows.
-
-    Attributes:
-        coordinates: As the sensors show them, shape (K + 1, joints, P, R) [m, rad].
-        rates: True rates, shape (K + 1, joints, P, R) [m/s, rad/s].
-        commands: Commands of each row, shape (K, inputs, P, R) (R only open loop: (K, inputs, 1, R)).
-        delivered: Mean force of the drives over each row, before what they cannot know (ripple, backlash), shape
-            (K, inputs, P, R) [N or N m]; None where it was not asked for.
-    """
-
-    coordinates: np.ndarray
-    rates: np.ndarray
-    commands: np.ndarray
-    delivered: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class StateFeedback:
-    """u = -K (y - y_ref), y = [coordinates, rates] as measured, limited to +-`limit`.
-
-    Attributes:
-        gains: Shape (inputs, 2 joints) [N or N m per unit].
-        rate_filter: Time constant of the low-pass on differenced coordinates [s]; None where
-            the rates themselves are measured.
-        limit: Largest command [N or N m].
-    """
-
-    gains: np.ndarray
-    rate_filter: float | None = None
-    limit: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -99,6 +66,10 @@ class AnalyticSimulator:
 
     def __post_init__(self) -> None:
         check_positive(step=self.step)
+
+    def smoothed(self, speeds: tuple[float, ...]) -> "AnalyticSimulator":
+        """The same engine with dry friction that builds up over these `speeds` of the joints [m/s, rad/s]."""
+        return replace(self, smoothing=speeds)
 
     def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
         """Open loop: the recorded commands act on every model.

@@ -10,7 +10,7 @@ from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.sim.analytic import StateFeedback
+from wipx.sim.simulator import StateFeedback
 from wipx.tasks.identify import Identify
 from wipx.tasks.job import Job
 from wipx.tasks.results import write_csv, written_together

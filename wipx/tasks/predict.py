@@ -11,7 +11,7 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
-from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import Simulator
 from wipx.tasks.job import Job
 from wipx.tasks.results import write_csv, write_json, written_together
 
@@ -47,7 +47,7 @@ class Predict:
         judge = Judge(job.part("sim"), sensor_noise(recordings, model.plant), HORIZON, self.lead)
         errors, traces = judge.compare(nominal, model, recordings, held_out=True)
         if self.residual is not None:
-            learned = replace(judge, simulator=self._learned(job.part("sim"), model, judge.noise))
+            learned = replace(judge, simulator=self._learned(model, judge.noise))
             beside, traces = learned.compare(model, model, recordings, held_out=True)
             errors = replace(errors, completed=beside.completed, noise_floor=beside.noise_floor)
         columns = model.plant.coordinates
@@ -72,7 +72,7 @@ class Predict:
         figures = ", ".join(f"{n} {errors.completed[n]:.4g} {model.plant.unit_of(n)}" for n in columns)
         print(f"rms error of {errors.windows} predictions over {HORIZON:g} s: {figures}; written to {job.out}")
 
-    def _learned(self, simulator: AnalyticSimulator, model: Model, noise: np.ndarray) -> AnalyticSimulator:
+    def _learned(self, model: Model, noise: np.ndarray) -> Simulator:
         """The simulator with the learned acceleration."""
         from wipx.rivals.learned_simulator import learned_simulator
         from wipx.rivals.network import read_network
@@ -81,7 +81,7 @@ class Predict:
         joints = len(model.plant.joints)
         inputs = 2 * joints + len(model.plant.commands)
         network = read_network(Path(self.residual), features=inputs, joints=joints)
-        return learned_simulator(simulator, network, noise)
+        return learned_simulator(network, noise)
 
 
 def _rms(values: np.ndarray) -> float:

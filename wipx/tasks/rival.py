@@ -68,7 +68,7 @@ def _errors(case: Case, answer: Answer, lead: float) -> FitErrors:
     errors, _ = judge.compare(case.nominal, answer.model, case.recordings, held_out=False)
     if answer.network is None:
         return errors
-    learned = Judge(learned_simulator(case.simulator, answer.network, case.noise), case.noise, HORIZON, lead)
+    learned = Judge(learned_simulator(answer.network, case.noise), case.noise, HORIZON, lead)
     black_box, _ = learned.compare(answer.model, answer.model, case.recordings, held_out=False)
     return FitErrors(errors.horizon, errors.windows, errors.nominal, black_box.completed, black_box.noise_floor)
 

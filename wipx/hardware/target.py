@@ -1,0 +1,60 @@
+"""The contract of every robot, emulated or real: trials under a control loop in, recordings out."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from wipx.control.loop import Loop
+from wipx.core.load import Load
+from wipx.core.model import Model
+from wipx.core.recording import Recording
+
+Reference = Callable[[float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of a robot.
+
+    Attributes:
+        name: Of its recording.
+        duration: From the release on [s].
+        load: Name of the load on its body, a key of `Target.loads`; None for none.
+        pitch: At which it is held until it is released, at rest and at x = 0 [rad].
+        reference: Of coordinates and rates over time since the release, shape (2 joints,); None for zero.
+    """
+
+    name: str
+    duration: float
+    load: str | None = None
+    pitch: float = 0.0
+    reference: Reference | None = None
+
+
+class Target(Protocol):
+    """A robot that can be run."""
+
+    @property
+    def loads(self) -> Mapping[str, Load]:
+        """Weights that can be put on it, by name, as its owner has measured them."""
+        ...
+
+    def nominal(self) -> Model:
+        """The robot without load as its owner believes it to be."""
+        ...
+
+    def run(self, trials: Sequence[Trial], loop: Loop, rng: np.random.Generator) -> Iterator[Recording]:
+        """Run trials one after the other; a recording begins at the release and ends where the robot is stopped.
+
+        Args:
+            trials: What is done.
+            loop: Drives the robot; reset before every trial.
+            rng: Draws what differs between trials of an emulated robot.
+
+        Yields:
+            One recording for each trial: `t` from 0, coordinates and rates as the sensors show them, `u` as commanded,
+            `u_measured` as the drive reports it.
+        """
+        ...
