@@ -4,9 +4,10 @@ PY := .venv/bin/python
 READY := .venv/.ready
 RECORDINGS ?=
 PROFILE ?= quick
+SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real concealed test test-slow check bench lock clean
+.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction table-methods table-estimators test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,6 +32,28 @@ real: $(READY)  ## diagnose public recordings of real robots blind: the table of
 
 concealed: $(READY)  ## diagnose 30 fresh robots with concealed physics (PROFILE=full: 300, the table of docs/blind_results.md)
 	$(PY) -m wipx +experiment=concealed profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)
+
+ablation-optim: $(READY)  ## compare nine optimizers, five seeds each (PROFILE=full: the paper's budget)
+	$(PY) -m wipx +experiment=ablation_optim$(SUFFIX) -m
+
+table-optim: $(READY)  ## table and convergence figure of ablation-optim, run first where it is not finished
+	$(PY) -m wipx +experiment=ablation_optim$(SUFFIX) -m
+	$(PY) -m wipx task=optimizer_table task.folder=runs/ablation_optim$(SUFFIX) hydra.run.dir=runs/tables/optimizers
+
+fig-trajectories: $(READY)  ## reality gap and trajectories of the paper's five methods
+	$(PY) -m wipx +experiment=reality_gap -m
+	$(PY) -m wipx task=method_table task.folder=runs/reality_gap hydra.run.dir=runs/tables/methods
+
+table-methods: $(READY)  ## the paper's Table I: an estimator trained in five simulations (PROFILE=full: LSTM, ten seeds)
+	$(PY) -m wipx +experiment=table_methods$(SUFFIX) -m
+	$(PY) -m wipx task=table_methods task.folder=runs/table_methods$(SUFFIX) hydra.run.dir=runs/tables/table_methods
+
+table-estimators: $(READY)  ## the paper's Table II: estimators and lengths (PROFILE=full: five seeds)
+	$(PY) -m wipx +experiment=table_estimators$(SUFFIX) -m
+	$(PY) -m wipx task=table_estimators task.folder=runs/table_estimators$(SUFFIX) hydra.run.dir=runs/tables/table_estimators
+
+fig-friction: $(READY)  ## the paper's Fig. 3: its joint model beside Coulomb and viscous friction
+	$(PY) -m wipx task=friction_figure hydra.run.dir=runs/tables/friction
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -m "not slow"

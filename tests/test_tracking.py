@@ -63,6 +63,32 @@ def test_a_run_is_logged_with_all_it_has(tmp_path: Path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "runs with blanks"]
 
 
+def test_jobs_of_a_sweep_stand_under_one_run_that_takes_what_was_made_of_them(tmp_path: Path):
+    sweep = tmp_path / "ablation" / "quick"
+    sweep.mkdir(parents=True)
+    table = tmp_path / "table.md"
+    table.write_text("| a |")
+    tracking = MlflowTracking(str(tmp_path / "runs"))
+    for name in ("a", "b"):
+        tracking.log(name, {}, {"loss": 1.0}, {}, [], {}, sweep=sweep)
+    tracking.log_sweep(sweep, {"best": 0.5}, [table])
+
+    parents = _rows(tmp_path / "runs", "select run_uuid from runs where name = 'ablation/quick'")
+    assert len(parents) == 1
+    children = _rows(tmp_path / "runs", "select value from tags where key = 'mlflow.parentRunId'")
+    assert children == parents * 2
+    assert _rows(tmp_path / "runs", "select value from metrics where key = 'best'") == [(0.5,)]
+    assert [path.name for path in (tmp_path / "runs" / "mlartifacts").rglob("*.md")] == ["table.md"]
+
+
+def test_a_sweep_whose_database_was_removed_gets_a_new_run(tmp_path: Path):
+    sweep = tmp_path / "sweep"
+    sweep.mkdir()
+    MlflowTracking(str(tmp_path / "before")).log("a", {}, {}, {}, [], {}, sweep=sweep)
+    MlflowTracking(str(tmp_path / "after")).log("a", {}, {}, {}, [], {}, sweep=sweep)
+    assert len(_rows(tmp_path / "after", "select name from runs")) == 2
+
+
 @pytest.mark.slow
 def test_processes_that_start_together_on_a_fresh_database_all_log_and_stay_quiet(tmp_path: Path):
     command = [sys.executable, "-c", LOG_ONE_RUN, str(tmp_path)]

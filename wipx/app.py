@@ -23,6 +23,7 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
+from wipx.tasks.finished import ERROR
 from wipx.tasks.job import Job
 
 ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
@@ -108,9 +109,18 @@ def run_task(config: DictConfig, out: Path) -> None:
         part=part,
         build=build,
         settings=settings,
+        chosen=dict(HydraConfig.get().runtime.choices) if HydraConfig.initialized() else {},
+        sweep=sweep_of(out),
     )
     part("task").run(job)
     OmegaConf.save(OmegaConf.create(settings), out / "config.yaml")
+
+
+def sweep_of(out: Path) -> Path | None:
+    """Folder of the sweep that a job in `out` belongs to; None for a single run."""
+    if not HydraConfig.initialized() or HydraConfig.get().mode is not RunMode.MULTIRUN:
+        return None
+    return out.parent
 
 
 def explanation(error: BaseException) -> str | None:
@@ -140,6 +150,8 @@ def _run_reported(config: DictConfig, out: Path) -> None:
     except Exception as error:
         if HydraConfig.get().mode is RunMode.RUN:
             raise JobFailed(error) from error
+        line = explanation(error) or f"{type(error).__name__}: {error}"
+        (out / ERROR).write_text(f"{line}\n\n{traceback.format_exc()}", encoding="utf-8")
         if isinstance(error, InputError):
             raise
         raise RuntimeError(f"the job in {out} failed") from error

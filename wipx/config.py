@@ -54,6 +54,8 @@ class RunConfig:
         target: The robot that is driven.
         controller: What drives it.
         rival: What people would use in place of a diagnosis.
+        method: Which simulation a training set comes from.
+        estimator: What estimates the equilibrium pitch.
         tracking: Where runs are logged.
     """
 
@@ -74,6 +76,8 @@ class RunConfig:
     target: Any = None
     controller: Any = None
     rival: Any = None
+    method: Any = None
+    estimator: Any = None
     tracking: Any = None
 
 

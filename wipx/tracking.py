@@ -24,6 +24,7 @@ LONGEST_PARAMETER = 6000  # characters of a parameter's value
 LONGEST_TAG = 5000  # characters of a tag's value
 METRICS_IN_BATCH = 1000
 PARAMETERS_IN_BATCH = 100
+PARENT = ".mlflow_run"  # in a sweep's folder: the id of its own run
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,12 @@ class NoTracking:
         histories: Mapping[str, np.ndarray],
         artifacts: Sequence[Path],
         tags: Mapping[str, str],
+        sweep: Path | None = None,
     ) -> None:
         """Do nothing; the arguments are those of `MlflowTracking.log`."""
+
+    def log_sweep(self, sweep: Path, metrics: Mapping[str, float], artifacts: Sequence[Path]) -> None:
+        """Do nothing; the arguments are those of `MlflowTracking.log_sweep`."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,7 @@ class MlflowTracking:
         histories: Mapping[str, np.ndarray],
         artifacts: Sequence[Path],
         tags: Mapping[str, str],
+        sweep: Path | None = None,
     ) -> None:
         """Log one finished run.
 
@@ -75,13 +81,18 @@ class MlflowTracking:
                 the same name stays the last value.
             artifacts: Files to copy.
             tags: Texts by name.
+            sweep: Folder of the sweep that the run is a job of: MLflow shows it under the sweep's own run, which the
+                first job to finish makes. None for a single run.
 
         Raises:
             InputError: the folder cannot be written.
         """
         folder = Path(self.folder).resolve()
         client, experiment_id = self._opened(folder)
-        run = client.create_run(experiment_id, run_name=run_name, tags=_texts(tags, LONGEST_TAG))
+        texts = _texts(tags, LONGEST_TAG)
+        if sweep is not None:
+            texts |= {"mlflow.parentRunId": self._parent(client, experiment_id, folder, sweep)}
+        run = client.create_run(experiment_id, run_name=run_name, tags=texts)
         status = "FAILED"
         try:
             _log_parameters(client, run.info.run_id, _texts(parameters, LONGEST_PARAMETER))
@@ -91,6 +102,35 @@ class MlflowTracking:
             status = "FINISHED"
         finally:
             client.set_terminated(run.info.run_id, status)
+
+    def log_sweep(self, sweep: Path, metrics: Mapping[str, float], artifacts: Sequence[Path]) -> None:
+        """Log what was made of all jobs of a sweep to the sweep's own run.
+
+        Args:
+            sweep: Its folder.
+            metrics: Final numbers by name.
+            artifacts: Files to copy; they replace those of the same name.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        folder = Path(self.folder).resolve()
+        client, experiment_id = self._opened(folder)
+        run_id = self._parent(client, experiment_id, folder, sweep)
+        _log_metrics(client, run_id, metrics, {})
+        for path in artifacts:
+            client.log_artifact(run_id, str(path))
+
+    def _parent(self, client: "MlflowClient", experiment_id: str, folder: Path, sweep: Path) -> str:
+        """The id of a sweep's own run; parallel jobs get the same."""
+        note = sweep / PARENT
+        with _locked(folder):
+            if note.is_file() and _exists(client, run_id := note.read_text(encoding="utf-8").strip()):
+                return run_id
+            run = client.create_run(experiment_id, run_name=f"{sweep.parent.name}/{sweep.name}")
+            client.set_terminated(run.info.run_id)
+            note.write_text(run.info.run_id, encoding="utf-8")
+            return run.info.run_id
 
     def _opened(self, folder: Path) -> tuple["MlflowClient", str]:
         """A client of the database and the experiment's id, both created where they do not exist."""
@@ -128,6 +168,16 @@ def _quiet_client_type() -> type["MlflowClient"]:
     from mlflow import MlflowClient  # takes seconds
 
     return MlflowClient
+
+
+def _exists(client: "MlflowClient", run_id: str) -> bool:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        client.get_run(run_id)
+    except MlflowException:
+        return False
+    return True
 
 
 def _log_parameters(client: "MlflowClient", run_id: str, parameters: Mapping[str, str]) -> None:

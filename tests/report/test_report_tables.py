@@ -7,7 +7,7 @@ from report import synthetic
 
 from wipx.core.results import FitErrors
 from wipx.report.outcome import headline, judged_errors, remark, signal_errors
-from wipx.report.tables import errors_table, estimates_table, summary
+from wipx.report.tables import markdown, summary
 
 
 def test_headline_gives_errors_on_held_out_recordings_with_units():
@@ -42,17 +42,9 @@ def test_remarks_name_bounds_doubt_and_missing_intervals():
     assert "do not determine" in remarks[4]
 
 
-def test_errors_table_is_markdown_with_held_out_first():
-    lines = errors_table(synthetic.result()).splitlines()
-    assert lines[2] == "| held-out | x | mm | 21.0 | 2.10 | 0.800 | 10 times smaller |"
-    assert len({line.count("|") for line in lines}) == 1
-
-
-def test_estimates_table_keeps_hostile_text_inside_its_cell():
-    whole = synthetic.result()
-    hostile = replace(whole.estimates[0], meaning="a | b <script>\nc")
-    row = estimates_table(replace(whole, estimates=(hostile,))).splitlines()[2]
-    assert "a \\| b &lt;script&gt; c" in row
+def test_a_table_keeps_hostile_text_inside_its_cell():
+    lines = markdown(("name", "value"), [("a | b <script>\nc", "1")], numbers=(1,)).splitlines()
+    assert lines == ["| name | value |", "| --- | ---: |", "| a \\| b &lt;script&gt; c | 1 |"]
 
 
 def test_summary_is_aligned_and_complete():

@@ -46,17 +46,22 @@ class ParameterSpace:
         """The model before the identification, or its nearest neighbour in the cube, shape (D,)."""
         return self.to_cube(np.array([p.neutral for p in self.free]))
 
-    def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
+    def sample(self, count: int, rng: np.random.Generator, reach: float = 1.0) -> np.ndarray:
         """Random positions, shape (count, D), most of them close to the neutral one.
 
         Physics that was left out is mostly small beside what moves the robot: distances from
         the neutral value are spread evenly over decades. Numbers that are searched on a
         logarithmic scale are spread evenly over it.
+
+        Args:
+            count: How many.
+            rng: Draws them.
+            reach: Share of the way from the neutral value to the end of an interval, up to which is drawn.
         """
         uniform = qmc.Sobol(len(self.free), rng=rng).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
         neutral = self.neutral
         end = (rng.random(uniform.shape) < 1.0 - neutral).astype(float)
-        near = neutral + (end - neutral) * 10.0 ** (-DECADES * uniform)
+        near = neutral + reach * (end - neutral) * 10.0 ** (-DECADES * uniform)
         return np.where(self._logarithmic(), uniform, near)
 
     def to_cube(self, values: np.ndarray) -> np.ndarray:

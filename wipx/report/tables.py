@@ -10,16 +10,6 @@ ERRORS_HEAD = ("recordings", "signal", "unit", "nominal", "completed", "noise fl
 ESTIMATES_HEAD = ("parameter", "meaning", "unit", "before", "value", "95 % interval", "remark")
 
 
-def errors_table(result: IdentificationResult) -> str:
-    """Prediction errors per signal as a Markdown table, held-out recordings first."""
-    return _markdown(ERRORS_HEAD, error_rows(result), numbers=(3, 4, 5))
-
-
-def estimates_table(result: IdentificationResult) -> str:
-    """Identified parameters with their 95 % intervals as a Markdown table."""
-    return _markdown(ESTIMATES_HEAD, estimate_rows(result.estimates), numbers=(3, 4))
-
-
 def summary(result: IdentificationResult) -> str:
     """The whole outcome as aligned plain text: errors, parameters, search and notes."""
     lines = [f"{result.title} ({result.plant})", headline(result), ""]
@@ -59,11 +49,35 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: tuple[int, ...]) -> str:
-    """A GitHub table; columns in `numbers` are set flush right."""
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: tuple[int, ...]) -> str:
+    """A GitHub table; columns in `numbers` are set flush right.
+
+    Args:
+        head: Names of the columns.
+        rows: Their cells.
+        numbers: Columns that hold numbers.
+    """
     rules = ["---:" if column in numbers else "---" for column in range(len(head))]
     cells = [[_cell(text) for text in row] for row in rows]
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, rules, *cells)) + "\n"
+
+
+def latex(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: tuple[int, ...]) -> str:
+    """The same as a LaTeX tabular with rules of booktabs; arguments as of `markdown`."""
+    columns = "".join("r" if column in numbers else "l" for column in range(len(head)))
+    lines = [f"\\begin{{tabular}}{{{columns}}}", "\\toprule", _latex_row(head), "\\midrule"]
+    return "\n".join([*lines, *map(_latex_row, rows), "\\bottomrule", "\\end{tabular}"]) + "\n"
+
+
+def _latex_row(cells: Sequence[str]) -> str:
+    return " & ".join(map(_latex_cell, cells)) + " \\\\"
+
+
+def _latex_cell(text: str) -> str:
+    """Text in which no character means anything to LaTeX."""
+    special = {"\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}"}
+    escaped = "".join(special.get(c, f"\\{c}" if c in "&%$#_{}" else c) for c in text)
+    return escaped.replace("+-", r"$\pm$")
 
 
 def _cell(text: str) -> str:

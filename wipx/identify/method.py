@@ -1,0 +1,61 @@
+"""Which simulation later training sets come from: the five methods of the paper, Sec. V-C."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from wipx.core.errors import InputError
+from wipx.core.model import Model
+from wipx.core.plant import Plant
+from wipx.identify.friction import IdentifiedFriction, JointFriction
+
+BUILT_IN = ("viscous", "coulomb", "rotor_inertia")  # of every joint: what physics engines call damping,
+# friction loss and armature; with the gear of the motor seven numbers for a plant of two joints
+
+
+@dataclass(frozen=True)
+class Method:
+    """Physics beside the rigid body, and where its numbers come from.
+
+    Attributes:
+        physics: `none`; `friction`: the chosen friction and effects=[...]; `built_in`: joint damping, friction loss,
+            armature and motor gear, which every physics engine has.
+        values: `nominal`; `optimised`: those that match the recordings best; `random`: drawn by
+            `ParameterSpace.sample`.
+        reach: Share of the search intervals over which random numbers are spread; a robot whose friction is as large as
+            what drives it does not move at all.
+    """
+
+    physics: Literal["none", "friction", "built_in"]
+    values: Literal["nominal", "optimised", "random"]
+    reach: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.reach <= 1.0:
+            raise InputError(f"method.reach is {self.reach:g}, expected a share in (0, 1]")
+        if (self.physics == "none") != (self.values == "nominal"):
+            raise InputError(
+                f"method: physics={self.physics} with values={self.values} leaves nothing to do; "
+                "physics=none goes with values=nominal only"
+            )
+
+    def switched_on(
+        self, model: Model, friction: JointFriction | IdentifiedFriction, effects: tuple[str, ...]
+    ) -> tuple[str, ...]:
+        """Effects whose numbers are optimised or drawn.
+
+        Args:
+            model: The nominal model; an effect that it has already is left as it is.
+            friction: The chosen friction.
+            effects: Further effects that were switched on, as "site/kind".
+        """
+        if self.physics == "none":
+            return ()
+        if self.physics == "friction":
+            return tuple(dict.fromkeys((*friction.switched_on(model, None), *effects)))
+        return tuple(name for name in built_in(model.plant) if name not in model.effects)
+
+
+def built_in(plant: Plant) -> tuple[str, ...]:
+    """Effects that a physics engine has as parameters of its own."""
+    joints = tuple(f"{joint}/{kind}" for joint in plant.joints for kind in BUILT_IN)
+    return (*joints, "actuator/gain")
