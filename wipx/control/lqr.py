@@ -1,10 +1,13 @@
 """Linear quadratic regulator on the linearised plant: the paper's baseline controller."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from wipx.control.ekf import Ekf, FilterNoise
 from wipx.control.linearise import linearise
+from wipx.control.regulator import Regulator
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.sim.simulator import StateFeedback
@@ -22,6 +25,7 @@ class Lqr:
         rate_filter: Time constant of the low-pass on differenced coordinates [s]; None where the
             rates are measured.
         limit: Largest command [N or N m].
+        noise: Levels of `FilterNoise` that replace the usual ones in the state estimate of `loop`, by name.
     """
 
     coordinates: tuple[float, ...] = (20.0, 100.0)
@@ -30,9 +34,11 @@ class Lqr:
     rate: float = 650.0
     rate_filter: float | None = 0.005
     limit: float = 100.0
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_positive(command=self.command, rate=self.rate, limit=self.limit)
+        FilterNoise.of(self.noise, "controller.noise")
 
     def feedback(self, model: Model) -> StateFeedback:
         """The gains for a model's rigid body.
@@ -56,3 +62,12 @@ class Lqr:
         if np.max(np.real(poles)) >= 0.0:
             raise InputError(f"controller: the closed loop is not stable, poles {np.round(poles, 3).tolist()}")
         return StateFeedback(np.asarray(gains), self.rate_filter, self.limit)
+
+    def loop(self, model: Model) -> Regulator:
+        """The gains for a model's rigid body, on a state estimated with the whole model.
+
+        Raises:
+            InputError: as in `feedback`.
+        """
+        estimator = Ekf(model, FilterNoise.of(self.noise, "controller.noise"))
+        return Regulator(estimator, self.feedback(model), self.rate)

@@ -13,6 +13,8 @@ from tqdm import tqdm
 from wipx.core.errors import check_positive
 from wipx.core.recording import Recording
 from wipx.hardware.target import Target, Trial
+from wipx.hardware.testbed import EmulatedTestbed
+from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.simulator import StateFeedback
 from wipx.tasks.job import Job
@@ -73,6 +75,8 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
     nominal = job.part("plant").nominal(target.nominal())
     if not (folder / "robot.yaml").is_file():
         write_robot(folder / "robot.yaml", target, controller.feedback(nominal), controller.rate)
+    if isinstance(target, EmulatedTestbed):
+        write_model(target.hidden().model, hidden_file(folder))
     loop = controller.loop(nominal)
     for k, trial in tqdm(missing, desc=f"recording {len(target.loads)} loads", leave=False, disable=None):
         (recording,) = target.run([trial], loop, np.random.default_rng([plan.seed, k]))

@@ -1,0 +1,163 @@
+"""One step of a state estimate: the mean by the equations of motion, the covariance by their slopes; compiled.
+
+The equations are those of contract section 2 with the smooth part of the model's effects: input gain, offset, dead
+zone, gain and saturation on the path of the command, friction that builds up over a small speed in place of sticking
+and of bristles, tilt, spring. Lags, backlash, ripple, the lag of the paper's friction and payload events are left
+out: an estimator that sees the sensors every 1.5 ms takes what little they do in that time for process noise.
+"""
+
+import math
+
+import numpy as np
+
+from wipx.core.law import clip, law, sin_cos
+from wipx.effects import dead_zone, quadratic_drag, stribeck
+from wipx.sim import rows as R
+from wipx.sim.cache import cached
+
+LONGEST = 2e-3  # [s] of a step; the midpoint rule then errs by 1e-7 of the pitch of a body that falls at 7 1/s
+REACH = 1e-5  # [m, rad, m/s, rad/s] of central differences; far below the speeds over which friction builds up
+
+
+@law
+def drive_force(command, c):
+    """Force of a drive for a command that has arrived [N or N m]."""
+    u = dead_zone.force(command * c[R.INPUT_GAIN] + c[R.OFFSET], c[R.DEAD_BAND], 0.0)
+    return clip(u * c[R.GAIN], -c[R.FORCE_MAX], c[R.FORCE_MAX])
+
+
+@law
+def friction(rate, j, c, ease):
+    """Friction on joint j [N or N m]; dry friction builds up over the speed `ease`."""
+    level = c[R.LEVEL_PLUS + j] if rate > 0.0 else c[R.LEVEL_MINUS + j]
+    level += stribeck.bump(rate, c[R.STATIC + j], c[R.COULOMB + j], c[R.STRIBECK_SPEED + j])
+    level += c[R.SLIDING + j] + stribeck.bump(rate, c[R.PEAK + j], c[R.SLIDING + j], c[R.PEAK_SPEED + j])
+    level += c[R.PAPER_COULOMB + j] + stribeck.bump(
+        rate, c[R.PAPER_STATIC + j], c[R.PAPER_COULOMB + j], c[R.PAPER_SPEED + j]
+    )
+    viscous = c[R.VISCOUS + j] + c[R.PAPER_VISCOUS + j]
+    return quadratic_drag.force(rate, c[R.DRAG + j]) - level * math.tanh(rate / ease) - viscous * rate
+
+
+@law
+def inverse_mass(y, c, double):
+    """The symmetric inverse of the mass matrix, as its entries 11, 12, 22."""
+    if double:
+        _, cosine = sin_cos(y[1])
+        elbow = c[R.DP_ELBOW] + c[R.DP_COUPLING] * cosine
+        m11 = c[R.DP_BASE] + 2.0 * c[R.DP_COUPLING] * cosine + c[R.ROTOR]
+        m12, m22 = elbow, c[R.DP_ELBOW] + c[R.ROTOR1]
+    else:
+        _, cosine = sin_cos(y[1] - c[R.BALANCE] - c[R.TILT])
+        m11, m12, m22 = c[R.MASS], -c[R.COUPLING] * cosine, c[R.INERTIA]
+    determinant = m11 * m22 - m12 * m12
+    return m22 / determinant, -m12 / determinant, m11 / determinant
+
+
+@law
+def slopes(y, commands, c, double, ease):
+    """Rates and accelerations of both joints at the state y = [coordinates, rates]."""
+    force = drive_force(commands[0], c) + friction(y[2], 0, c, ease[0])
+    force1 = drive_force(commands[1], c) + friction(y[3], 1, c, ease[1])
+    if double:
+        sine, _ = sin_cos(y[1])
+        sine1, _ = sin_cos(y[0])
+        sine12, _ = sin_cos(y[0] + y[1])
+        coupling, lower = c[R.DP_COUPLING] * sine, c[R.DP_GRAVITY] * sine12
+        force += coupling * (2.0 * y[2] + y[3]) * y[3] - c[R.DP_GRAVITY1] * sine1 - lower
+        force1 -= coupling * y[2] * y[2] + lower
+    else:
+        upright = y[1] - c[R.BALANCE]
+        sine, _ = sin_cos(upright)
+        sine_to_rail, _ = sin_cos(upright - c[R.TILT])
+        force -= c[R.COUPLING] * sine_to_rail * y[3] * y[3] + c[R.TILT_FORCE]
+        force -= c[R.SPRING] * (y[0] - c[R.SPRING_REST])
+        force1 += c[R.GRAVITY] * sine
+    w11, w12, w22 = inverse_mass(y, c, double)
+    return np.array([y[2], y[3], w11 * force + w12 * force1, w12 * force + w22 * force1])
+
+
+@law
+def moved(y, commands, step, c, double, ease):
+    """The state after a `step`, by the midpoint rule."""
+    middle = y + 0.5 * step * slopes(y, commands, c, double, ease)
+    return y + step * slopes(middle, commands, c, double, ease)
+
+
+@law
+def spread(y, step, density, c, double):
+    """Covariance that white forces of a spectral `density` (2,) [N^2 s] add in a `step`, shape (4, 4)."""
+    w11, w12, w22 = inverse_mass(y, c, double)
+    added = np.zeros((4, 4))
+    accelerations = (
+        (w11 * w11 * density[0] + w12 * w12 * density[1], w12 * (w11 * density[0] + w22 * density[1])),
+        (w12 * (w11 * density[0] + w22 * density[1]), w12 * w12 * density[0] + w22 * w22 * density[1]),
+    )
+    for i in range(2):
+        for j in range(2):
+            a = accelerations[i][j]
+            added[2 + i, 2 + j] = a * step
+            added[i, 2 + j] = added[2 + i, j] = 0.5 * a * step**2
+            added[i, j] = a * step**3 / 3.0
+    return added
+
+
+@cached
+def propagate(y, covariance, commands, duration, c, double, ease, density):
+    """State and covariance after a `duration` under held commands.
+
+    Args:
+        y: Coordinates, then rates, of both joints, shape (4,); those of a joint that the plant lacks are zero.
+        covariance: Shape (4, 4).
+        commands: On both joints, after the delay, shape (2,) [N or N m].
+        duration: Any length [s].
+        c: Coefficients of the model, shape (N_COEFFICIENTS,).
+        double: Whether it is a double pendulum.
+        ease: Speed over which dry friction builds up, shape (2,) [m/s or rad/s].
+        density: Spectral density of unknown forces on the joints, shape (2,) [N^2 s or (N m)^2 s].
+
+    Returns:
+        The same two, later.
+    """
+    pieces = max(1, math.ceil(duration / LONGEST - 1e-9))
+    step = duration / pieces
+    jacobian = np.empty((4, 4))
+    for _ in range(pieces):
+        for i in range(4):
+            ahead, behind = y.copy(), y.copy()
+            ahead[i] += REACH
+            behind[i] -= REACH
+            difference = moved(ahead, commands, step, c, double, ease) - moved(behind, commands, step, c, double, ease)
+            jacobian[:, i] = difference / (2.0 * REACH)
+        covariance = jacobian @ covariance @ jacobian.T + spread(y, step, density, c, double)
+        covariance = 0.5 * (covariance + covariance.T)  # of round-off, an asymmetry would grow without end
+        y = moved(y, commands, step, c, double, ease)
+    return y, covariance
+
+
+@cached
+def correct(y, covariance, measured, scale, offset, variance):
+    """State and covariance after a reading of independent channels, one after the other.
+
+    Args:
+        y: Shape (4,).
+        covariance: Shape (4, 4).
+        measured: Of every state; NaN where nothing new was read, shape (4,).
+        scale: A channel shows scale times its state plus offset, shape (4,).
+        offset: See there, shape (4,).
+        variance: Of the noise of each channel, shape (4,).
+
+    Returns:
+        State, covariance, innovations (4,), each given the channels before it and NaN where nothing was read, and
+        their variances (4,).
+    """
+    innovations, variances = np.full(4, np.nan), np.full(4, np.nan)
+    for i in range(4):
+        if np.isnan(measured[i]):
+            continue
+        innovations[i] = measured[i] - scale[i] * y[i] - offset[i]
+        variances[i] = scale[i] * scale[i] * covariance[i, i] + variance[i]
+        gain = covariance[:, i] * (scale[i] / variances[i])
+        y = y + gain * innovations[i]
+        covariance = covariance - variances[i] * np.outer(gain, gain)
+    return y, covariance, innovations, variances
