@@ -14,12 +14,12 @@ from wipx.core.plant import PLANTS, plant_of
 from wipx.core.recording import Recording
 from wipx.identify.evaluation import Judge
 from wipx.rivals.case import Case
-from wipx.rivals.mujoco_body import mjcf
 from wipx.rivals.mujoco_problem import Piece
 from wipx.rivals.mujoco_sysid import MujocoSysid
 from wipx.rivals.rigid_body import RigidBody
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.mjcf import BUILT_IN, mjcf
 
 Effects = Mapping[str, Mapping[str, float]]
 
@@ -88,7 +88,7 @@ def test_a_positive_pitch_falls_as_in_the_analytic_simulator(mujoco: Any):
     inputs = Inputs.regular(0.5, 1.0 / step, 1)
     start = np.array([0.0, 0.1, 0.0, 0.2])
     run = SIMULATOR.replay(ModelBatch(model), inputs, start[:, None, None])
-    compiled = mujoco.MjModel.from_xml_string(mjcf(model, step))
+    compiled = mujoco.MjModel.from_xml_string(mjcf(model, step, built_in=BUILT_IN))
     data = mujoco.MjData(compiled)
     data.qpos[:], data.qvel[:] = start[:2], start[2:]
     mujoco.mj_step(compiled, data, len(inputs.t) - 1)

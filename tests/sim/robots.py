@@ -15,6 +15,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Simulator
 
 BODY = {"body_mass": 2.6, "wheel_mass": 1.2, "com_height": 0.35, "body_inertia": 0.11}
 LINKS = {
@@ -66,7 +67,7 @@ def unit_axis(effects: Effects) -> Model:
     return robot("linear_axis", effects, {"body_mass": 0.0, "wheel_mass": 1.0})
 
 
-def move(model: Model, initial, t: np.ndarray, commands=None, simulator: AnalyticSimulator | None = None) -> Motion:
+def move(model: Model, initial, t: np.ndarray, commands=None, simulator: Simulator | None = None) -> Motion:
     """Replay `commands` (K,) or (K, inputs), none by default, on rows at times `t` (K + 1,)."""
     held = np.zeros((len(t) - 1, len(model.plant.commands)))
     if commands is not None:

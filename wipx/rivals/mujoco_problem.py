@@ -16,19 +16,20 @@ from wipx.core.model import Model, ModelBatch
 from wipx.identify.prediction import DIVERGED, Predictor
 from wipx.identify.problem import WindowProblem
 from wipx.identify.windows import Windows
-from wipx.rivals.mujoco_body import BUILT_IN, mjcf
 from wipx.rivals.prediction_search import at
+from wipx.sim.mjcf import BUILT_IN, mjcf
 
 STEP = 2.5e-3  # [s] of the integrator
 DIFFERENCE = 1e-3  # of the search interval, for slopes; sticking joints answer to less in jumps
 PULL = 10.0  # towards the neutral values, over the whole search interval, in typical residuals of one row
 SEEN = 1e-3  # of the strongest; directions of the state that a window tells less of are not free in it
+IN_THE_BODY = ("inertia",)  # effects that change masses
 ON_SIGNALS = ("delay", "scale", "bias")  # effects that the hooks apply
 
 
 def is_expressible(effect: str) -> bool:
     """Whether the toolbox can have an effect "site/kind"."""
-    return effect.partition("/")[2] in (*BUILT_IN, *ON_SIGNALS)
+    return effect.partition("/")[2] in (*BUILT_IN, *IN_THE_BODY, *ON_SIGNALS)
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,7 @@ class ToolboxProblem(WindowProblem):
         """The toolbox's residual of each window."""
         compiled = lru_cache(maxsize=64)(lambda values: self._compiled(at(self.space, np.array(values))))
         nominal = at(self.space, self.space.neutral)
-        spec = self.toolbox.mujoco.MjSpec.from_string(mjcf(nominal, STEP))
+        spec = self.toolbox.mujoco.MjSpec.from_string(mjcf(nominal, STEP, built_in=BUILT_IN))
         return [
             self.toolbox.sysid.build_residual_fn(
                 models_sequences=[self._sequence(nominal, spec, piece, start)],
@@ -208,7 +209,7 @@ class ToolboxProblem(WindowProblem):
         ]
 
     def _compiled(self, model: Model) -> Any:
-        return self.toolbox.mujoco.MjModel.from_xml_string(mjcf(model, STEP))
+        return self.toolbox.mujoco.MjModel.from_xml_string(mjcf(model, STEP, built_in=BUILT_IN))
 
     def _sequence(self, nominal: Model, spec: Any, piece: Piece, start: Start) -> Any:
         commands = piece.commands(0.0)

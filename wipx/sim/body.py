@@ -16,12 +16,18 @@ def load_body(S):
 
 
 @law
+def share_after(S, w):
+    """Share of the step of lane w that is after the payload event."""
+    h = maximum(S[R.STEP * W + w], 1e-12)
+    return clip((S[R.TIME * W + w] + h - S[R.EVENT_TIME * W + w]) / h, 0.0, 1.0)
+
+
+@law
 def payload_event(S):
     """Masses after t0 in place of those before, weighed by the share of the step after t0."""
     load_body(S)
     for w in range(W):
-        h = maximum(S[R.STEP * W + w], 1e-12)
-        after = clip((S[R.TIME * W + w] + h - S[R.EVENT_TIME * W + w]) / h, 0.0, 1.0)
+        after = share_after(S, w)
         S[R.M11 * W + w] += after * S[R.EVENT_MASS * W + w]
         S[R.M22 * W + w] += after * S[R.EVENT_INERTIA * W + w]
         S[R.COUPLING_NOW * W + w] += after * S[R.EVENT_COUPLING * W + w]

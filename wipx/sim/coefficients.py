@@ -66,8 +66,13 @@ class _Filler:
             self.rows[row] += values[symbol]
 
 
-def coefficients(batch: ModelBatch) -> Coefficients:
-    """The coefficients of every model of a batch."""
+def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coefficients:
+    """The coefficients of every model of a batch.
+
+    Args:
+        batch: P models.
+        smoothing: Speed over which the dry friction of each joint builds up [m/s, rad/s]; empty for sticking.
+    """
     f = _Filler(batch)
     _set_neutral(f.rows)
     plant = f.plant
@@ -80,6 +85,9 @@ def coefficients(batch: ModelBatch) -> Coefficients:
     _actuator(f)
     for site in plant.joints:
         _joint(f, site, joint_index(site))
+    for site, speed in zip(plant.joints, smoothing, strict=False):
+        f.rows[R.SMOOTHING + joint_index(site)] = speed
+        f.present[R.ON_SMOOTHING] = True
     for site, column in plant.columns.items():
         _sensor(f, f"sensor_{column}", joint_index(site))
     actuated = np.zeros(2, dtype=np.bool_)

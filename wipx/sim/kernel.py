@@ -3,7 +3,8 @@
 `step` is the page of physics in causal order: the command's path (`actuator`), environment and rigid
 body (`body`), friction and motion (`joints`); `sensors` shows what is recorded. Each part is a loop
 over the lanes of a block that the compiler turns into vector instructions; a part that is
-absent costs one untaken branch per block.
+absent costs one untaken branch per block. An engine in place of `body` has the same page
+around it (`wipx.sim.coupling`).
 
 Integrator: position Verlet. Coordinates drift half a step, rates take a whole one with forces
 of mid-step, coordinates drift the other half; second order. Viscous terms are implicit in the
@@ -12,7 +13,7 @@ mean rate, Coriolis terms use a predicted rate of mid-step.
 
 import numpy as np
 
-from wipx.core.law import law, maximum, relaxing
+from wipx.core.law import inlined, law, maximum, relaxing
 from wipx.sim import rows as R
 from wipx.sim.actuator import actuator_path, delayed_command
 from wipx.sim.body import double_body, load_body, payload_event, spring, wip_body
@@ -22,9 +23,26 @@ from wipx.sim.rows import W
 from wipx.sim.sensors import correct, feedback, record
 
 
+@inlined
+def respond(S, on):
+    """Friction, and the motion under all forces; the rigid body's mass matrix and forces are known."""
+    levels(S, on, 0)
+    levels(S, on, 1)
+    smooth_friction(S, on, 0)
+    smooth_friction(S, on, 1)
+    move(S, on)
+    for w in range(W):
+        h = S[R.STEP * W + w]
+        S[R.TIME * W + w] += h
+        S[R.STARTED * W + w] = maximum(S[R.STARTED * W + w], 1.0 if h > 0.0 else 0.0)
+
+
 @law
 def step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
-    """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit."""
+    """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit.
+
+    Where an engine moves the rigid body, this ends with the forces that act on it.
+    """
     for j in range(2):
         for w in range(W):
             half = 0.5 * S[R.STEP * W + w]
@@ -58,23 +76,17 @@ def step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
             S[R.PLUS1 * W + w] = S[R.LEVEL_PLUS1 * W + w]
             S[R.MINUS * W + w] = S[R.LEVEL_MINUS * W + w]
             S[R.MINUS1 * W + w] = S[R.LEVEL_MINUS1 * W + w]
-    if on[R.ON_EVENT]:
-        payload_event(S)
     if on[R.ON_SPRING]:
         spring(S)
+    if on[R.ON_ENGINE]:
+        return
+    if on[R.ON_EVENT]:
+        payload_event(S)
     if on[R.ON_DOUBLE]:
         double_body(S)
     else:
         wip_body(S, on)
-    levels(S, on, 0)
-    levels(S, on, 1)
-    smooth_friction(S, on, 0)
-    smooth_friction(S, on, 1)
-    move(S, on)
-    for w in range(W):
-        h = S[R.STEP * W + w]
-        S[R.TIME * W + w] += h
-        S[R.STARTED * W + w] = maximum(S[R.STARTED * W + w], 1.0 if h > 0.0 else 0.0)
+    respond(S, on)
 
 
 @law

@@ -1,0 +1,140 @@
+"""MuJoCo behind the contract of simulators (`sim=mujoco`)."""
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wipx.core.errors import InputError
+from wipx.core.model import Model, ModelBatch
+from wipx.sim import exchange as E
+from wipx.sim import mujoco_batch
+from wipx.sim.exchange import Exchange
+from wipx.sim.inputs import Inputs
+from wipx.sim.mechanism import EVENT, check_possible
+from wipx.sim.mjcf import mjcf
+from wipx.sim.simulator import Rollouts
+from wipx.sim.stepped import SteppedSimulator, World, single
+
+
+@dataclass(frozen=True)
+class MujocoSimulator(SteppedSimulator):
+    """MuJoCo, stepped explicitly."""
+
+    @property
+    def name(self) -> str:
+        """Of the option."""
+        return "mujoco"
+
+    def open(self) -> World:
+        """Room for a model.
+
+        Raises:
+            InputError: MuJoCo is not installed.
+        """
+        return MujocoWorld(engine(), self.step)
+
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+        """Open loop, in MuJoCo's own batches where they serve; see `Simulator.replay`."""
+        if not mujoco_batch.serves(batch, inputs, initial, self.step):
+            return super().replay(batch, inputs, initial)
+        for p in range(batch.size):
+            check_possible(single(batch, p), self.name)
+        return mujoco_batch.replay(engine(), batch, inputs, initial, self.step)
+
+
+def engine() -> Any:
+    """MuJoCo's module.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        return importlib.import_module("mujoco")
+    except ModuleNotFoundError as error:
+        raise InputError(
+            'sim=mujoco needs MuJoCo, which is not installed; pip install "mujoco>=4.0,<5" or use sim=analytic'
+        ) from error
+
+
+@dataclass(frozen=True)
+class _Lane:
+    """Views of one lane: MuJoCo's data and what is exchanged with the laws."""
+
+    data: Any
+    qpos: np.ndarray
+    qvel: np.ndarray
+    inertia: np.ndarray
+    bias: np.ndarray
+    applied: np.ndarray
+    place: np.ndarray
+    speed: np.ndarray
+    mass: np.ndarray
+    held: np.ndarray
+    push: np.ndarray
+
+    @classmethod
+    def of(cls, data: Any, exchange: Exchange, lane: int) -> "_Lane":
+        return cls(
+            data,
+            data.qpos,
+            data.qvel,
+            data.M,
+            data.qfrc_bias,
+            data.qfrc_applied,
+            exchange.of(E.PLACE, lane),
+            exchange.of(E.SPEED, lane),
+            exchange.mass(lane),
+            exchange.of(E.BIAS, lane),
+            exchange.of(E.PUSH, lane),
+        )
+
+
+class MujocoWorld:
+    """One compiled model and a state for each lane; see `World`."""
+
+    def __init__(self, mujoco: Any, step: float) -> None:
+        self.mujoco = mujoco
+        self.step = step
+
+    def load(self, model: Model, exchange: Exchange, lanes: int) -> None:
+        """See `World`."""
+        self.model = self.mujoco.MjModel.from_xml_string(mjcf(model, self.step))
+        self.durations = exchange.values[E.DURATION]
+        self.loaded = exchange.values[E.LOADED]
+        self.lanes = [_Lane.of(self.mujoco.MjData(self.model), exchange, lane) for lane in range(lanes)]
+        self.time_step = self.step
+        self.payload = model.effects[f"geometry/{EVENT}"]["mass"] if f"geometry/{EVENT}" in model.effects else None
+
+    def close(self) -> None:
+        """See `World`."""
+        self.lanes = []
+
+    def weigh(self) -> None:
+        """See `World`."""
+        copy, step1 = np.copyto, self.mujoco.mj_step1
+        for lane, x in enumerate(self.lanes):
+            if self.durations[lane] > 0.0:
+                if self.payload is not None:
+                    # What MuJoCo derives from masses beforehand is for constraints, of which there are none.
+                    self.model.body(EVENT).mass[0] = self.loaded[lane] * self.payload
+                copy(x.qpos, x.place)
+                copy(x.qvel, x.speed)
+                step1(self.model, x.data)
+                copy(x.mass, x.inertia)
+                copy(x.held, x.bias)
+
+    def advance(self) -> None:
+        """See `World`."""
+        copy, step2 = np.copyto, self.mujoco.mj_step2
+        for lane, x in enumerate(self.lanes):
+            duration = self.durations[lane]
+            if duration > 0.0:
+                if duration != self.time_step:
+                    self.time_step = duration
+                    self.model.opt.timestep = duration
+                copy(x.applied, x.push)
+                step2(self.model, x.data)
+                copy(x.place, x.qpos)
+                copy(x.speed, x.qvel)

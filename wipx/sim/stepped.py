@@ -1,0 +1,252 @@
+"""Physics engines behind the contract of simulators: the engine moves the rigid body, the compiled laws do the rest.
+
+An engine is stepped in Python, a world of one model at a time. Delays, actuators, friction, sensors and feedback
+are those of the analytic simulator (`wipx.sim.coupling`); no law stands twice.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
+
+import numpy as np
+
+from wipx.core.errors import check_positive
+from wipx.core.model import Model, ModelBatch
+from wipx.sim import rows as R
+from wipx.sim.coefficients import coefficients
+from wipx.sim.coupling import after, before, begin, between, show
+from wipx.sim.exchange import Exchange
+from wipx.sim.inputs import Inputs
+from wipx.sim.layout import HELD, OPEN, ClosedLoop, Layout
+from wipx.sim.mechanism import check_possible
+from wipx.sim.rows import W
+from wipx.sim.simulator import Rollouts, StateFeedback
+
+
+class World(Protocol):
+    """An engine that moves rigid bodies; it holds one model at a time, in up to `W` lanes."""
+
+    def load(self, model: Model, exchange: Exchange, lanes: int) -> None:
+        """Take a model's body in place of the one before.
+
+        Args:
+            model: Rigid body, with what geometry and environment have to do with it.
+            exchange: Where states and forces are read and written in each step; inertia that the engine's
+                joints cannot have is written into it now.
+            lanes: States of the body that are moved side by side.
+        """
+        ...
+
+    def weigh(self) -> None:
+        """Write mass matrix and bias forces of every lane that has a step."""
+        ...
+
+    def advance(self) -> None:
+        """One semi-implicit Euler step of every lane that has one, under its push; write places and speeds."""
+        ...
+
+    def close(self) -> None:
+        """Give back what the engine holds."""
+        ...
+
+
+def single(batch: ModelBatch, p: int) -> Model:
+    """Model p of a batch."""
+    if batch.values is None:
+        return batch.model
+    return batch.model.with_values(dict(zip(batch.names, batch.values[p].tolist(), strict=True)))
+
+
+@dataclass(frozen=True)
+class SteppedSimulator(ABC):
+    """A physics engine with the effects around it.
+
+    Attributes:
+        step: Longest step of the engine [s]; rows further apart are divided evenly.
+        smoothing: Speed over which the dry friction of each joint builds up, shape (joints,)
+            [m/s, rad/s]; empty for true sticking. Only searches use it, on their way.
+    """
+
+    step: float = 1e-3
+    smoothing: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_positive(step=self.step)
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Of the engine, as `sim=` has it."""
+
+    @abstractmethod
+    def open(self) -> World:
+        """An empty world.
+
+        Raises:
+            InputError: the engine's package is not installed.
+        """
+
+    def smoothed(self, speeds: tuple[float, ...]) -> Self:
+        """The same engine with dry friction that builds up over these `speeds` of the joints [m/s, rad/s]."""
+        return replace(self, smoothing=speeds)
+
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+        """Open loop: the recorded commands act on every model; see `Simulator.replay`."""
+        run = _Run(self, batch, inputs)
+        out = run.advance(initial, run.layout.recorded(), ramps=run.layout.ramps())
+        return run.layout.rollouts(out, inputs.commands[:, :, None, :])
+
+    def close_loop(
+        self,
+        batch: ModelBatch,
+        inputs: Inputs,
+        initial: np.ndarray,
+        feedback: StateFeedback,
+        references: np.ndarray,
+        noise: np.ndarray | None = None,
+    ) -> Rollouts:
+        """Closed loop: the feedback computes the command at every row; see `Simulator.close_loop`."""
+        run = _Run(self, batch, inputs)
+        commands = np.zeros((run.layout.rows, 2, run.layout.lanes))
+        out = run.advance(initial, commands, loop=run.layout.loop(feedback, references, noise))
+        return run.layout.rollouts(out, run.layout.per_command(commands))
+
+    def drive(
+        self, model: Model, inputs: Inputs, initial: np.ndarray, controller: Callable[[float, np.ndarray], np.ndarray]
+    ) -> Rollouts:
+        """Closed loop with any controller, one row at a time; see `Simulator.drive`."""
+        run = _Run(self, ModelBatch(model), inputs)
+        commands = np.zeros((run.layout.rows, 2, 1))
+        out = run.advance(initial[:, None, None], commands, controller=controller)
+        return run.layout.rollouts(out, run.layout.per_command(commands))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Lanes of one model in the layout of the compiled code.
+
+    Attributes:
+        exchange: Between the laws and the engine.
+        rows: Coefficients, states and scratch, shape (N_ROWS, W).
+        lanes: Window and column of the commands of every lane, shape (2, W).
+        pointers: Row whose command is just leaving the transport delay, shape (W,).
+        counts: Steps of the present row, shape (W,).
+        first: Lane of the first among all.
+        count: How many there are.
+    """
+
+    exchange: Exchange
+    rows: np.ndarray
+    lanes: np.ndarray
+    pointers: np.ndarray
+    counts: np.ndarray
+    first: int
+    count: int
+
+
+class _Run:
+    """One call of the simulator."""
+
+    def __init__(self, simulator: SteppedSimulator, batch: ModelBatch, inputs: Inputs) -> None:
+        self.simulator = simulator
+        self.models = [single(batch, p) for p in range(batch.size)]
+        for model in self.models:
+            check_possible(model, simulator.name)
+        self.inputs = inputs
+        self.layout = Layout(batch.model.plant, batch.size, inputs)
+        self.coefficients = coefficients(batch, simulator.smoothing)
+        self.coefficients.present[R.ON_ENGINE] = True
+        self.substeps = inputs.substeps(simulator.step)
+        self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
+        self.past = self.layout.past(self.coefficients.present)
+
+    def advance(
+        self,
+        initial: np.ndarray,
+        commands: np.ndarray,
+        *,
+        ramps: np.ndarray = HELD,
+        loop: ClosedLoop = OPEN,
+        controller: Callable[[float, np.ndarray], np.ndarray] | None = None,
+    ) -> np.ndarray:
+        """What the sensors show of every lane, shape (K + 1, 4, lanes).
+
+        Args:
+            initial: Shape (2 joints, P, R).
+            commands: Shape (K, 2, R), or (K, 2, lanes) where a `loop` or a `controller` writes them.
+            ramps: Change of the commands along each row, shape (K, 2, R).
+            loop: Compiled feedback.
+            controller: Of a single lane.
+        """
+        states = self.layout.states(initial)
+        self.coefficients.present[R.ON_RAMP] = ramps is not HELD
+        out = np.empty((self.layout.rows + 1, 4, self.layout.lanes))
+        own = loop is not OPEN or controller is not None
+        world = self.simulator.open()
+        try:
+            for p, model in enumerate(self.models):
+                for window in range(0, self.inputs.windows, W):
+                    block = self._block(p, window, states, own)
+                    world.load(model, block.exchange, block.count)
+                    self._advance(block, world, commands, ramps, loop, controller, out)
+        finally:
+            world.close()
+        return out
+
+    def _block(self, p: int, window: int, states: np.ndarray, own: bool) -> _Block:
+        """Windows of model p from `window` on; places that are left repeat the last of them and pause."""
+        count = min(W, self.inputs.windows - window)
+        windows = window + np.minimum(np.arange(W), count - 1)
+        lanes = p * self.inputs.windows + windows
+        rows = np.zeros((R.N_ROWS, W))
+        rows[: R.N_COEFFICIENTS] = self.coefficients.rows[:, p, None]
+        rows[R.N_COEFFICIENTS : R.N_STATES] = states[:, lanes]
+        return _Block(
+            Exchange(self.layout.joints),
+            rows,
+            np.stack([windows, lanes if own else windows]).astype(np.int64),
+            np.zeros(W, dtype=np.int64),
+            np.zeros(W, dtype=np.int64),
+            int(lanes[0]),
+            count,
+        )
+
+    def _advance(self, block: _Block, world: World, commands, ramps, loop: ClosedLoop, controller, out) -> None:
+        """Simulate every row of a block."""
+        on, t = self.coefficients.present, self.inputs.t
+        S, X = block.rows.reshape(-1), block.exchange.values
+        lanes, pointers, counts = block.lanes, block.pointers, block.counts
+        actuated, first, count = self.coefficients.actuated, block.first, block.count
+        pattern, driven = self.layout.pattern, self.layout.driven
+        for k in range(self.layout.rows):
+            show(S, on, self.past, t, lanes, k, out, first, count)
+            if controller is not None:
+                commands[k, driven, 0] = controller(float(t[k, 0]), out[k, pattern, 0])
+            least, most = begin(
+                S,
+                on,
+                t,
+                commands,
+                ramps,
+                self.row_steps,
+                self.substeps,
+                lanes,
+                counts,
+                actuated,
+                k,
+                first,
+                count,
+                loop is not OPEN,
+                loop.gains,
+                loop.references,
+                loop.noise,
+                loop.settings,
+            )
+            for s in range(most):
+                before(S, X, on, t, commands, ramps, lanes, pointers, actuated, counts, least, s)
+                world.weigh()
+                between(S, X, on)
+                world.advance()
+                after(S, X)
+        show(S, on, self.past, t, lanes, self.layout.rows, out, first, count)
