@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from wipx.core.diagnosis import Diagnosis
-from wipx.core.errors import check_positive
+from wipx.core.errors import InputError, check_positive
 from wipx.diagnosis.case import Robot, diagnose
 from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.job import Job
 from wipx.tasks.progress import StageProgress
 from wipx.tasks.results import flat, write_csv, write_json, written_together
@@ -36,7 +37,14 @@ class Diagnose:
         self.of(job, job.part("recordings"))
 
     def of(self, job: Job, source: RecordingSource) -> Diagnosis:
-        """Diagnose the recordings of a source and leave the results in the job's folder."""
+        """Diagnose the recordings of a source and leave the results in the job's folder.
+
+        Raises:
+            InputError: the simulator has no observer, or the recordings or their description are at fault.
+        """
+        simulator = job.part("sim")
+        if not isinstance(simulator, AnalyticSimulator):
+            raise InputError("a diagnosis follows recordings with an observer, which sim=analytic alone has; choose it")
         description = source.describe()
         recordings = source.load()
         robot = Robot(job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description))
@@ -44,7 +52,7 @@ class Diagnose:
             diagnosis = diagnose(
                 recordings,
                 robot,
-                job.part("sim"),
+                simulator,
                 title=source.name,
                 source=str(source.path) if source.robot is None else "recordings.robot",
                 lead=self.lead,

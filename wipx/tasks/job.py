@@ -1,7 +1,7 @@
 """What a task is given: the settings of one run, and the swappable parts it may ask for."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ class Job:
             first asked for, so that a part that is never used costs nothing.
         build: Builds a part from a mapping with `_target_`; takes its name for messages too.
         settings: The whole configuration in plain containers, for logging.
+        chosen: Option that was chosen of each group, by group; empty where a run was put together otherwise.
+        sweep: Folder of the sweep that the run is a job of; None for a single run.
     """
 
     out: Path
@@ -33,3 +35,5 @@ class Job:
     part: Callable[[str], Any]
     build: Callable[[object, str], Any]
     settings: Mapping[str, Any]
+    chosen: Mapping[str, str] = field(default_factory=dict)
+    sweep: Path | None = None
