@@ -17,7 +17,7 @@ from wipx.config import build
 from wipx.core.parameters import FreeParameter
 from wipx.identify.optimizers.least_squares import LeastSquares
 from wipx.identify.optimizers.pso import ParticleSwarm
-from wipx.identify.optimizers.search import Progress
+from wipx.identify.optimizers.search import Log, Progress, unwatched
 from wipx.identify.parameter_space import ParameterSpace
 
 OPTIONS = sorted(path.stem for path in (configuration_folder() / "optimizer").glob("*.yaml"))
@@ -31,6 +31,9 @@ class CurvedValley:
     hole: float = 0.0
     pause: float = 0.0
     calls: list[int] = field(default_factory=list, compare=False)
+    lost: list[int] = field(default_factory=list, compare=False)
+    valleys: int = 2
+    differences: int = 2
 
     @property
     def space(self) -> ParameterSpace:
@@ -45,7 +48,9 @@ class CurvedValley:
         self.calls.append(len(cube))
         time.sleep(self.pause)
         values = np.array([np.mean(self.residuals(row) ** 2) for row in cube])
-        return np.where(cube[:, 0] < self.hole, np.inf, values)
+        fallen = cube[:, 0] < self.hole
+        self.lost.append(int(fallen.sum()))
+        return np.where(fallen, [np.inf, np.nan][len(self.calls) % 2], values)
 
     def residuals(self, cube: np.ndarray) -> np.ndarray:
         d = cube - BEST
@@ -97,7 +102,8 @@ def test_the_budget_of_evaluations_ends_the_search(optimizer, budget: int):
     problem = CurvedValley()
     minimum = replace(optimizer, evaluations=budget).minimise(problem, np.random.default_rng(3))
     assert minimum.history.stopped in (f"budget of {budget} evaluations", "converged")
-    assert minimum.history.evaluations[-1] < budget + 50  # one batch may be under way
+    assert minimum.history.evaluations[-1] < budget + 10  # slopes may be under way
+    assert sum(problem.calls) <= budget + 2
     assert np.isfinite(minimum.loss)
 
 
@@ -123,9 +129,12 @@ def test_a_watcher_sees_the_progress_and_can_cancel(optimizer):
 
 
 def test_candidates_that_fell_over_are_counted_and_never_chosen(optimizer):
-    minimum = optimizer.minimise(CurvedValley(hole=0.06), np.random.default_rng(6))
-    assert minimum.cube[0] >= 0.06
-    assert minimum.failed > 0
+    problem = CurvedValley(hole=0.3)
+    minimum = optimizer.minimise(problem, np.random.default_rng(6))
+    assert minimum.cube[0] >= 0.3
+    # SciPy's methods look at the model's own start too, which is no candidate of theirs.
+    assert sum(problem.lost) > 0
+    assert minimum.failed in (sum(problem.lost) - 1, sum(problem.lost))
     assert np.isfinite(minimum.loss)
 
 
@@ -168,3 +177,55 @@ def test_least_squares_tries_as_many_starts_as_it_is_told():
     four = LeastSquares(starts=4, smoothing=(0.0,)).minimise(CurvedValley(), np.random.default_rng(10))
     assert four.loss <= one.loss
     assert four.history.evaluations[-1] > 2 * one.history.evaluations[-1]
+
+
+@dataclass(frozen=True)
+class Bowl:
+    """A smooth bowl in twelve dimensions, ten times as steep one way as another."""
+
+    valleys: int = 1
+    differences: int = 1
+
+    @property
+    def space(self) -> ParameterSpace:
+        names = (f"geometry/payload.p{i}" for i in range(12))
+        return ParameterSpace(nominal_model("wip"), tuple(FreeParameter(n, "1", 0.0, 1.0, 0.1, 0.05) for n in names))
+
+    def smoothed(self, level: float) -> "Bowl":
+        return self
+
+    def losses(self, cube: np.ndarray) -> np.ndarray:
+        return np.mean(((cube - BOTTOM) @ STEEPNESS) ** 2, axis=1)
+
+    def residuals(self, cube: np.ndarray) -> np.ndarray:
+        return STEEPNESS.T @ (cube - BOTTOM)
+
+    def jacobian(self, cube: np.ndarray, size: np.ndarray | float = 0.0) -> np.ndarray:
+        return STEEPNESS.T
+
+
+BOTTOM = np.random.default_rng(0).uniform(0.2, 0.8, 12)
+STEEPNESS = np.linalg.qr(np.random.default_rng(1).normal(size=(12, 12)))[0] * np.geomspace(0.1, 1.0, 12)
+BUDGET = 6_000
+# Share of the loss at the model's start that may be left. Populations without a model of the valley converge slowly
+# along it, a swarm with an inertia of 0.9 is still moving, and a simplex shrinks slowly in twelve dimensions.
+LEFT = {"ga": 0.1, "pso": 0.1, "nelder_mead": 0.1}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+@pytest.mark.parametrize("fresh", [False, True], ids=["fixed", "fresh"])
+def test_the_bottom_of_a_bowl_in_twelve_dimensions_is_found(name: str, fresh: bool, fresh_seed: int):
+    optimizer = build(yaml.safe_load((configuration_folder() / "optimizer" / f"{name}.yaml").read_text()), "optimizer")
+    minimum = replace(optimizer, evaluations=BUDGET).minimise(Bowl(), np.random.default_rng(fresh_seed if fresh else 0))
+    assert minimum.loss < LEFT.get(name, 1e-4) * Bowl().losses(Bowl().space.start[None])[0]
+
+
+def test_the_course_of_a_long_search_is_thinned():
+    log = Log("test", 100_000, 1e9, unwatched)
+    for i in range(50_000):
+        log.add(np.zeros((1, 1)), np.array([1.0 / (1 + i)]))
+    history = log.minimum("converged").history
+    assert len(history.evaluations) <= 2000
+    assert history.evaluations[-1] == 50_000
+    assert history.best_loss[-1] == 1.0 / 50_000
+    assert np.max(np.diff(history.evaluations)) <= 64

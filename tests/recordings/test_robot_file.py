@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from wipx.core.errors import InputError
-from wipx.recordings.robot_file import ControllerDescription, read_robot, robot_from_mapping
+from wipx.core.load import Load
+from wipx.recordings.robot_file import ControllerDescription, KnownLoad, read_robot, robot_from_mapping
 
 WIP = """
 plant: wip
@@ -23,6 +24,14 @@ controller: {kind: lqr, gains: [-3.2, 106.0, -6.4, 18.6], rate: 650.0}
 signals:
   x: {column: cart_pos_mm, scale: 0.001}
   theta: {column: pitch, unit: deg}
+"""
+)
+LOADED = (
+    WIP
+    + """
+loads:
+  m08: {mass: 0.8, height: 0.45, side: -0.18, recordings: "m08_*.csv"}
+  m16: {mass: 1.6, height: 0.45, side: 0.0, recordings: "m16_*.csv"}
 """
 )
 
@@ -52,11 +61,26 @@ def test_optional_parts_may_be_absent_or_empty(tmp_path: Path):
         assert not robot.model.effects
 
 
-def test_description_pickles(tmp_path: Path):
-    robot = read_robot(robot_file(tmp_path, COMPLETE))
+@pytest.mark.parametrize("text", [COMPLETE, LOADED])
+def test_description_pickles(tmp_path: Path, text: str):
+    robot = read_robot(robot_file(tmp_path, text))
     copy = pickle.loads(pickle.dumps(robot))
     assert copy.model.parameters == robot.model.parameters
     assert copy.signals == robot.signals
+    assert copy.loads == robot.loads
+
+
+def test_known_loads_belong_to_the_recordings_that_their_patterns_match(tmp_path: Path):
+    robot = read_robot(robot_file(tmp_path, LOADED))
+    assert robot.loads["m08"] == KnownLoad(Load(0.8, 0.45, -0.18), "m08_*.csv")
+    assert robot.load_of("m16_3.csv") == Load(1.6, 0.45, 0.0)
+    assert robot.load_of("bare_3.csv") is None
+
+
+def test_a_recording_that_two_loads_claim_is_named(tmp_path: Path):
+    robot = read_robot(robot_file(tmp_path, LOADED.replace("m16_*", "m*")))
+    with pytest.raises(InputError, match=r"^m08_1\.csv: claimed by the loads m08 and m16; mend .*$"):
+        robot.load_of("m08_1.csv")
 
 
 def test_two_commands_take_one_row_of_gains_each():
@@ -108,6 +132,17 @@ def test_command_in_volts_is_read_with_an_input_gain():
         (WIP + "controller: {kind: lqr, gains: [1, a], rate: 100}", "expected a list of numbers"),
         (WIP + "controller: {kind: lqr, gains: [1, 2], rate: -1}", "rate is -1, expected a frequency above 0 Hz"),
         (WIP + "signals: {x: {unit: deg}}", "signals.x: unit deg is not one of m"),
+        (WIP + "loads: {m8: 0.8}", "loads: m8 is 0.8, expected mass, height, side, recordings"),
+        (WIP + "loads: [0.8]", "loads is [0.8], expected names with values"),
+        (LOADED.replace("mass: 0.8, ", ""), "loads: m08 lacks mass (kg); add it"),
+        (LOADED.replace("side: 0.0", "sid: 0.0"), "unknown key 'sid'; did you mean side?"),
+        (LOADED.replace("mass: 0.8", "mass: -0.8"), "m08: mass = -0.8, expected a non-negative number of kg"),
+        (LOADED.replace("height: 0.45", "height: high"), "m08: height is 'high', expected a number (m, above"),
+        (LOADED.replace('"m08_*.csv"', "8"), "m08: recordings is 8, expected a pattern of file names"),
+        (
+            LOADED + "effects: {geometry/com_offset: {theta_eq: 0.1}}",
+            "loads: m08: load: the model has geometry/com_offset",
+        ),
         ("plant: [wip\n", "line 2: no YAML"),
         ("", "the file is empty"),
         ("- wip\n", "the file is a list"),

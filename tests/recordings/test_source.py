@@ -1,6 +1,7 @@
 """Folders of recordings: what is loaded, which part is kept, and what is held out."""
 
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from pyarrow import parquet
 
 from wipx.core.errors import InputError
+from wipx.core.load import Load
 from wipx.recordings.source import RecordingSource
 
 Columns = dict[str, np.ndarray]
@@ -176,3 +178,41 @@ def test_column_that_signals_name_must_be_in_the_log(folder: Path, swing: Swing,
     write_csv(folder / "a.csv", swing(10))
     with pytest.raises(InputError, match=r"column pitch of signals\.theta is missing; the file has t, theta, u"):
         RecordingSource(path=str(folder)).load()
+
+
+LOADED = """
+plant: cartpole
+parameters: {body_mass: 0.8, wheel_mass: 1.0, com_height: 0.4, body_inertia: 0.03}
+loads:
+  heavy: {mass: 1.6, height: 0.45, side: -0.18, recordings: "heavy_*"}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path: Path, swing, write_csv) -> Path:
+    """Two recordings of a cartpole, with and without a load."""
+    (tmp_path / "robot.yaml").write_text(LOADED)
+    for name in ("bare_1.csv", "heavy_1.csv"):
+        write_csv(tmp_path / name, {**swing(20), "x": np.linspace(0.0, 0.1, 20)})
+    return tmp_path
+
+
+def test_the_load_of_every_recording_is_known(loaded: Path):
+    source = RecordingSource(path=str(loaded))
+    recordings = source.load_all()
+    assert [r.name for r in recordings] == ["bare_1.csv", "heavy_1.csv"]
+    assert source.loads(recordings) == (None, Load(1.6, 0.45, -0.18))
+
+
+def test_recordings_with_loads_are_not_taken_for_those_of_one_robot(loaded: Path):
+    expected = rf"^{re.escape(str(loaded / 'robot.yaml'))} names loads, [^\n]*use task=adapt, or choose [^\n]*$"
+    with pytest.raises(InputError, match=expected):
+        RecordingSource(path=str(loaded)).load()
+    (bare,) = RecordingSource(path=str(loaded), files=["bare_*.csv"]).load()
+    assert bare.name == "bare_1.csv"
+
+
+def test_a_load_without_any_recording_is_named(loaded: Path):
+    (loaded / "heavy_1.csv").unlink()
+    with pytest.raises(InputError, match=r"loads: heavy: heavy_\* matches none of the recordings; mend the pattern$"):
+        RecordingSource(path=str(loaded)).load()

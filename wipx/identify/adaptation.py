@@ -1,8 +1,7 @@
 """Real-to-sim adaptation (paper, Algorithm 1): a simulation is made to resemble trials of a robot with known loads."""
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from wipx.core.recording import Recording
 from wipx.core.results import SearchHistory
 from wipx.effects.catalogue import check_together, effect_of
 from wipx.identify.closed_loop import ClosedLoopProblem
+from wipx.identify.intervals import intervals
 from wipx.identify.noise import sensor_noise
 from wipx.identify.objectives import FitData, PaperTrajectories
 from wipx.identify.optimizers.search import Optimizer, Watcher, unwatched
@@ -55,6 +55,7 @@ class Adapted:
     Attributes:
         models: The simulations: one, or one for each draw of random numbers; the first is the one that is shown.
         parameters: Numbers of the first, by name [SI].
+        intervals: Their 95 % intervals, where they were optimised.
         fit: Loss on the loads that the search saw.
         held_out: Loss on the others; None where there are none.
         history: Course of the search; None where nothing was searched.
@@ -63,6 +64,7 @@ class Adapted:
 
     models: tuple[Model, ...]
     parameters: Mapping[str, float]
+    intervals: Mapping[str, tuple[float, float]]
     fit: GapLoss
     held_out: GapLoss | None
     history: SearchHistory | None
@@ -110,6 +112,7 @@ class AdaptationProblem:
         return Adapted(
             models,
             dict(zip(space.names, values[0].tolist(), strict=True)),
+            {} if history is None else _intervals(self.fit, cube[0]),
             _loss(self.fit, cube),
             None if self.held_out is None else _loss(self.held_out, cube),
             history,
@@ -174,17 +177,18 @@ def adaptation(
     speeds = tuple(scales[site].velocity for site in nominal.plant.joints)
 
     def problem(part: LoadedTrials) -> ClosedLoopProblem:
-        labelled = replace(objective, classes=_pattern(names))
-        data = FitData(part.recordings, nominal, simulator, noise, speeds, trials.feedback, part.loads)
-        return labelled.problem(data, space)
+        data = FitData(part.recordings, nominal, simulator, noise, speeds, trials.feedback, part.loads, part.classes)
+        return objective.problem(data, space)
 
     unseen = problem(trials.of(set(held_out))) if held_out else None
     return AdaptationProblem(nominal, problem(seen), unseen, trials, frozenset(held_out))
 
 
-def _pattern(names: set[str]) -> str:
-    """A regular expression that finds a load's name at the beginning of a recording's."""
-    return f"^({'|'.join(sorted(map(re.escape, names), key=len, reverse=True))})_"
+def _intervals(problem: ClosedLoopProblem, cube: np.ndarray) -> dict[str, tuple[float, float]]:
+    return {
+        name: (float(low), float(high))
+        for name, (low, high) in zip(problem.space.names, intervals(problem, cube), strict=True)
+    }
 
 
 def _loss(problem: ClosedLoopProblem, cube: np.ndarray) -> GapLoss:

@@ -9,7 +9,6 @@ from wipx.core.model import Model
 from wipx.core.recording import RecordingSplit
 from wipx.core.results import Estimate, FitErrors, SearchHistory, Trace
 from wipx.effects.catalogue import check_together, effect_of
-from wipx.identify.closed_loop import ClosedLoopProblem
 from wipx.identify.evaluation import Judge
 from wipx.identify.intervals import intervals
 from wipx.identify.noise import sensor_noise
@@ -119,7 +118,7 @@ def identify(
     judge = Judge(simulator, noise, horizon, lead)
     fit, fit_traces = judge.compare(nominal, completed, split.fit, held_out=False)
     unseen, traces = judge.compare(nominal, completed, split.held_out, held_out=True) if split.held_out else (None, ())
-    ends = _intervals(problem, cube)
+    ends = intervals(problem, cube)
     estimates = _estimates(problem.space, cube, ends)
     return Identified(
         completed,
@@ -162,13 +161,6 @@ def _joined(first: SearchHistory, second: SearchHistory) -> SearchHistory:
         np.concatenate([first.best_loss, second.best_loss]),
         second.stopped,
     )
-
-
-def _intervals(problem: WindowProblem | ClosedLoopProblem, cube: np.ndarray) -> np.ndarray:
-    """95 % intervals; a closed-loop problem has too few independent pieces to give any."""
-    if isinstance(problem, WindowProblem):
-        return intervals(problem, cube)
-    return np.full((len(cube), 2), np.nan)
 
 
 def _estimates(space: ParameterSpace, cube: np.ndarray, ends: np.ndarray) -> tuple[Estimate, ...]:

@@ -7,9 +7,10 @@ from typing import Protocol
 import numpy as np
 
 from wipx.core.errors import InputError, check_positive
+from wipx.core.load import Load
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.identify.closed_loop import ClosedLoopProblem
+from wipx.identify.closed_loop import ClosedLoopProblem, Sampling, closed_loop_problem
 from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.prediction import Predictor
 from wipx.identify.problem import WindowProblem
@@ -28,6 +29,8 @@ class FitData:
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
         speeds: What each joint reaches, shape (joints,) [m/s or rad/s].
         feedback: The controller that closed the loop, and its rate [Hz]; None if unknown.
+        loads: Known load on the body in each recording; empty where there was none in any.
+        classes: Class of each recording; empty where the objective tells them apart.
     """
 
     recordings: tuple[Recording, ...]
@@ -36,6 +39,8 @@ class FitData:
     noise: np.ndarray
     speeds: tuple[float, ...]
     feedback: tuple[StateFeedback, float] | None
+    loads: tuple[Load | None, ...] = ()
+    classes: tuple[str, ...] = ()
 
 
 class Objective(Protocol):
@@ -110,11 +115,14 @@ class PaperTrajectories:
         period: Time between them [s] (paper: 80 samples in about 1.2 s).
         classes: Regular expression whose first group, searched in a recording's name, is its
             class; recordings of one class are averaged. Empty: each recording is a class.
+        at_rest: Whether the robot was released from rest at a recording's first row. The simulation then
+            starts at rest too; rates read off the first rows would be those of a robot that falls already.
     """
 
     samples: int = 80
     period: float = 0.015
     classes: str = ""
+    at_rest: bool = False
 
     def __post_init__(self) -> None:
         check_positive(samples=self.samples, period=self.period)
@@ -123,19 +131,23 @@ class PaperTrajectories:
         """Errors of the mean trajectories.
 
         Raises:
-            InputError: the controller is unknown or a recording is too short.
+            InputError: the controller is unknown, a recording is too short, or the loads do not fit the classes
+                or the free numbers.
         """
         if data.feedback is None:
             raise InputError(
                 "objective=paper closes the loop and needs the robot's controller: add `controller` to robot.yaml"
             )
-        return ClosedLoopProblem.of(
+        feedback, rate = data.feedback
+        return closed_loop_problem(
             data.recordings,
+            data.classes or [self._class_of(r.name) for r in data.recordings],
+            data.loads or [None] * len(data.recordings),
             space,
             data.simulator,
-            *data.feedback,
-            times=np.arange(self.samples) * self.period,
-            classes=[self._class_of(r.name) for r in data.recordings],
+            feedback,
+            Sampling(np.arange(self.samples) * self.period, rate, self.at_rest),
+            noise=data.noise,
             speeds=data.speeds,
         )
 

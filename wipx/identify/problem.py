@@ -1,5 +1,6 @@
 """What an optimizer minimises: prediction errors of windows, as a function of the unit cube."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -19,6 +20,16 @@ class Problem(Protocol):
     @property
     def space(self) -> ParameterSpace:
         """The numbers that vary."""
+        ...
+
+    @property
+    def valleys(self) -> int:
+        """From how many starts a local search should be tried, so that one finds the lowest minimum."""
+        ...
+
+    @property
+    def differences(self) -> int:
+        """Evaluations that `jacobian` takes for each number that varies."""
         ...
 
     def smoothed(self, level: float) -> "Problem":
@@ -54,6 +65,16 @@ class WindowProblem:
     speeds: tuple[float, ...]
     weights: np.ndarray | None = None
     _last: list[tuple[np.ndarray, Prediction]] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def valleys(self) -> int:
+        """Few: a window is short, and begins where the candidate would have it begin."""
+        return 2
+
+    @property
+    def differences(self) -> int:
+        """Two: they are central."""
+        return 2
 
     def smoothed(self, level: float) -> "WindowProblem":
         """The same problem with dry friction that builds up over a share `level` of the joints' speeds."""
@@ -97,7 +118,7 @@ class WindowProblem:
         prediction = self._prediction_near(cube)
         known, gain = self.predictor.state_gain(base, prediction.initial)
         rows = []
-        for part in _chunks(len(moved), self._chunk()):
+        for part in chunks(len(moved), self._chunk()):
             batch = self.space.batch(moved[part])
             state = np.repeat(prediction.initial, batch.size, axis=1)
             change = self.predictor.known_residuals(batch, state) - known
@@ -121,6 +142,16 @@ class WindowProblem:
         labels = window_of[self._mask()]
         groups = [np.flatnonzero(labels == r) for r in range(windows.count)]
         return groups + [np.array([i]) for i in range(len(labels), len(rows))]
+
+    def scores(self, cube: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """What each window, and each prior, adds to half the slope of the loss at a position (D,), shape (pieces, D).
+
+        Args:
+            cube: Position.
+            slopes: Of `residuals` there, shape (N, D).
+        """
+        residuals = self.residuals(cube)
+        return np.array([slopes[rows].T @ residuals[rows] for rows in self.by_window(residuals)])
 
     def reweighted(self, cube: np.ndarray) -> "WindowProblem":
         """The same problem, each signal weighed by the error that it has at a position (D,)."""
@@ -165,7 +196,7 @@ class WindowProblem:
         return max(1, LARGEST_CALL // numbers)
 
     def _residuals_of(self, cube: np.ndarray):
-        for part in _chunks(len(cube), self._chunk()):
+        for part in chunks(len(cube), self._chunk()):
             prediction: Prediction = self.predictor.predict(self.space.batch(cube[part]))
             flat = self._flat(self.predictor.residuals(prediction.coordinates, self.predictor.windows.predicted))
             priors = self.space.prior_residuals(cube[part])
@@ -180,5 +211,6 @@ def _replaced(cube: np.ndarray, values: np.ndarray) -> np.ndarray:
     return copies
 
 
-def _chunks(count: int, size: int):
+def chunks(count: int, size: int) -> Iterator[slice]:
+    """Slices of at most `size` that cover `count` items."""
     return (slice(i, min(i + size, count)) for i in range(0, count, size))

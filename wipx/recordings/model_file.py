@@ -25,7 +25,7 @@ from wipx.recordings.strict_yaml import finite_number, load_mapping
 
 SCHEMA = 1
 MODEL_KEYS = ("plant", "parameters", "effects")
-ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals")
+ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads")
 
 
 def write_model(model: Model, path: Path) -> None:

@@ -4,17 +4,26 @@ Its model part (plant, parameters, effects) is read by `wipx.recordings.model_fi
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 from types import MappingProxyType
 
 from wipx.core.errors import InputError, unknown_name
+from wipx.core.load import Load
 from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.recordings.model_file import ROBOT_KEYS, check_keys, mapping_of, model_from_mapping
 from wipx.recordings.signals import Signal, signal_from_mapping
 from wipx.recordings.strict_yaml import finite_number, load_mapping
 from wipx.recordings.units import COMMAND_UNITS, UNITS
+
+LOAD_KEYS = {
+    "mass": "kg",
+    "height": "m, above the wheel axis along the body",
+    "side": "m, beside the body's axis towards +x",
+    "recordings": "pattern of file names",
+}
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,19 @@ class ControllerDescription:
 
 
 @dataclass(frozen=True)
+class KnownLoad:
+    """A weight that was on the body in some of the recordings.
+
+    Attributes:
+        load: Its mass and place.
+        recordings: Pattern of the names of those recordings.
+    """
+
+    load: Load
+    recordings: str
+
+
+@dataclass(frozen=True)
 class RobotDescription:
     """The owner's nominal model and how the robot was recorded.
 
@@ -42,20 +64,37 @@ class RobotDescription:
             not listed is exact.
         controller: None where the owner gives none.
         signals: Columns of contract section 1 that the log has under another name, unit or sign.
+        loads: Known loads by name; a recording that none of them claims is of the robot without load.
     """
 
     model: Model
     uncertainty: Mapping[str, float]
     controller: ControllerDescription | None
     signals: Mapping[str, Signal]
+    loads: Mapping[str, KnownLoad] = field(default_factory=dict)
 
     def __reduce__(self):
         # Mapping proxies do not pickle; rebuild from plain dictionaries.
-        return RobotDescription, (self.model, dict(self.uncertainty), self.controller, dict(self.signals))
+        plain = (dict(self.uncertainty), self.controller, dict(self.signals), dict(self.loads))
+        return RobotDescription, (self.model, *plain)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainty", MappingProxyType(dict(self.uncertainty)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
+        object.__setattr__(self, "loads", MappingProxyType(dict(self.loads)))
+
+    def load_of(self, recording: str) -> Load | None:
+        """The load on the body in the recording of that name; None where there was none.
+
+        Raises:
+            InputError: two loads claim the recording.
+        """
+        claims = [name for name, known in self.loads.items() if fnmatch(recording, known.recordings)]
+        if len(claims) > 1:
+            raise InputError(
+                f"{recording}: claimed by the loads {' and '.join(claims)}; mend their recordings patterns"
+            )
+        return self.loads[claims[0]].load if claims else None
 
 
 def read_robot(path: Path) -> RobotDescription:
@@ -84,7 +123,8 @@ def robot_from_mapping(data: Mapping[str, object], where: str) -> RobotDescripti
     uncertainty = _uncertainty(mapping_of(data, "uncertainty", where), model, f"{where}: uncertainty")
     known = {*mapping_of(data, "parameters", where), *uncertainty}
     _check_input_gain(signals, model.plant, given="input_gain" in known, where=where)
-    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals)
+    loads = {n: _load(n, c, model, f"{where}: loads") for n, c in mapping_of(data, "loads", where).items()}
+    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals, loads)
 
 
 def _check_input_gain(signals: Mapping[str, Signal], plant: Plant, *, given: bool, where: str) -> None:
@@ -128,6 +168,31 @@ def _controller(data: Mapping[str, object], plant: Plant, where: str) -> Control
     if rate is None or rate <= 0.0:
         raise InputError(f"{where}: rate is {content['rate']!r}, expected a frequency above 0 Hz")
     return ControllerDescription(kind, _gains(content["gains"], len(plant.commands), where), rate)
+
+
+def _load(name: str, data: object, model: Model, where: str) -> KnownLoad:
+    where = f"{where}: {name}"
+    if not isinstance(data, Mapping):
+        raise InputError(f"{where} is {data!r}, expected {', '.join(LOAD_KEYS)}")
+    check_keys(data, tuple(LOAD_KEYS), where)
+    for key, meaning in LOAD_KEYS.items():
+        if key not in data:
+            raise InputError(f"{where} lacks {key} ({meaning}); add it")
+    numbers = {key: finite_number(data[key]) for key in LOAD_KEYS if key != "recordings"}
+    for key, number in numbers.items():
+        if number is None:
+            raise InputError(f"{where}: {key} is {data[key]!r}, expected a number ({LOAD_KEYS[key]})")
+    pattern = data["recordings"]
+    if not isinstance(pattern, str) or not pattern:
+        raise InputError(f"{where}: recordings is {pattern!r}, expected a pattern of file names such as m16_*.csv")
+    load = Load(**{key: number for key, number in numbers.items() if number is not None})
+    if load.mass < 0.0:
+        raise InputError(f"{where}: mass = {load.mass:g}, expected a non-negative number of kg")
+    try:
+        load.on(model)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    return KnownLoad(load, pattern)
 
 
 def _gains(data: object, commands: int, where: str) -> tuple[tuple[float, ...], ...]:

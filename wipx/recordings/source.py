@@ -3,7 +3,7 @@
 The settings are plain values, so that a YAML file of `conf/recordings` can hold them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from wipx.core.errors import InputError
+from wipx.core.load import Load
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording, RecordingSplit
 from wipx.recordings.held_out import FEWEST_ROWS, split_recordings
@@ -61,24 +62,57 @@ class RecordingSource:
             InputError: the description is missing or at fault.
         """
         if self.robot is not None:
-            return robot_from_mapping(self.robot, "recordings.robot")
+            return robot_from_mapping(self.robot, self._where())
         path = self._folder() / ROBOT_FILE
         if not path.is_file():
             raise InputError(f"{path} is missing; describe the robot there: plant and parameters{self._hint()}")
         return read_robot(path)
 
     def load(self) -> tuple[Recording, ...]:
-        """All recordings in SI, by file name; uneven time steps and missing rows stay as logged.
+        """All recordings of one robot in SI, by file name; uneven time steps and missing rows stay as logged.
+
+        Raises:
+            InputError: the folder, a file, a column or a row is missing or at fault, or the robot carried a
+                known load in some of the recordings, so that they are not of one robot.
+        """
+        recordings = self.load_all()
+        if any(load is not None for load in self.loads(recordings)):
+            raise InputError(
+                f"{self._where()} names loads, so its recordings are of robots that differ; use task=adapt, or "
+                "choose recordings without a load with recordings.files=[...]"
+            )
+        return recordings
+
+    def load_all(self) -> tuple[Recording, ...]:
+        """All recordings as `load` has them, of the robot with any of its known loads too.
 
         Raises:
             InputError: the folder, a file, a column or a row is missing or at fault.
         """
         robot = self.describe()
-        paths = self._paths()
+        paths = self._paths(self.files)
         for pattern in self.spans:
             if not any(fnmatch(name, pattern) for name in paths):
                 raise InputError(f"recordings.spans: {pattern} matches none of {', '.join(paths)}; mend the pattern")
         return tuple(self._recording(name, path, robot) for name, path in paths.items())
+
+    def loads(self, recordings: tuple[Recording, ...]) -> tuple[Load | None, ...]:
+        """What is known to have been on the body in each of the recordings; None where it was nothing.
+
+        Raises:
+            InputError: two loads claim one recording, or the pattern of a load matches no file.
+        """
+        robot = self.describe()
+        if robot.loads:
+            # Of all files, not the chosen ones: who chooses some need not mend robot.yaml.
+            everything = self._paths((*self.files, *GENERAL_PATTERNS))
+            for name, known in robot.loads.items():
+                if not any(fnmatch(file, known.recordings) for file in everything):
+                    raise InputError(
+                        f"{self._where()}: loads: {name}: {known.recordings} matches none of the recordings; "
+                        "mend the pattern"
+                    )
+        return tuple(robot.load_of(recording.name) for recording in recordings)
 
     def split(self, recordings: tuple[Recording, ...]) -> RecordingSplit:
         """Divide loaded recordings by the setting `held_out`.
@@ -87,6 +121,10 @@ class RecordingSource:
             InputError: the setting is at fault or leaves too little on one side.
         """
         return split_recordings(recordings, self.held_out)
+
+    def _where(self) -> str:
+        """Where the robot is described."""
+        return str(self._folder() / ROBOT_FILE) if self.robot is None else "recordings.robot"
 
     def _hint(self) -> str:
         return f" (the recordings come from {self.origin})" if self.origin else ""
@@ -101,11 +139,11 @@ class RecordingSource:
             raise InputError(f"recordings.path {folder} {found}; expected a folder of recordings{self._hint()}")
         return folder
 
-    def _paths(self) -> dict[str, Path]:
+    def _paths(self, patterns: Sequence[str]) -> dict[str, Path]:
         """Files by their name within the folder, sorted."""
         folder = self._folder()
         found = set()
-        for pattern in self.files:
+        for pattern in patterns:
             try:
                 matching = [path for path in folder.glob(pattern) if path.is_file()]
             except (ValueError, NotImplementedError) as error:
@@ -114,7 +152,7 @@ class RecordingSource:
                 raise InputError(f"{folder}: no file matches {pattern} of recordings.files{self._hint()}")
             found.update(matching)
         if not found:
-            raise InputError(f"{folder}: no recordings, expected files {' or '.join(self.files)}{self._hint()}")
+            raise InputError(f"{folder}: no recordings, expected files {' or '.join(patterns)}{self._hint()}")
         return {path.relative_to(folder).as_posix(): path for path in sorted(found)}
 
     def _recording(self, name: str, path: Path, robot: RobotDescription) -> Recording:

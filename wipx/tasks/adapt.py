@@ -67,7 +67,7 @@ def _result(job: Job, source: RecordingSource, adapted: Adapted, problem: Adapta
         fit=adapted.fit,
         held_out=adapted.held_out,
         parameters=adapted.parameters,
-        intervals={},
+        intervals=adapted.intervals,
         history=history,
         coordinates=problem.nominal.plant.coordinates,
         classes=adapted.classes,

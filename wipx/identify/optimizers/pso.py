@@ -11,7 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from wipx.core.errors import check_positive
-from wipx.identify.optimizers.search import BudgetSpentError, Log, Minimum, Watcher, unwatched
+from wipx.identify.optimizers.search import (
+    BudgetSpentError,
+    Log,
+    Minimum,
+    Start,
+    Watcher,
+    own_randomness,
+    unwatched,
+)
 from wipx.identify.problem import Problem
 
 
@@ -27,6 +35,7 @@ class ParticleSwarm:
         w: Inertia of a particle's velocity.
         evaluations: Budget of loss evaluations.
         seconds: Budget of time [s].
+        start: Where the first particle is: "random" like the others (paper), or at the "model"'s start.
     """
 
     particles: int = 50
@@ -36,6 +45,7 @@ class ParticleSwarm:
     w: float = 0.9
     evaluations: int = 1_000_000
     seconds: float = 1800.0  # the paper's cap, Sec. VI-C
+    start: Start = "model"
 
     def __post_init__(self) -> None:
         check_positive(particles=self.particles, iterations=self.iterations)
@@ -46,16 +56,15 @@ class ParticleSwarm:
         log = Log("pso", self.evaluations, self.seconds, watcher)
         dimension = len(problem.space.free)
         first = rng.random((self.particles, dimension))
-        first[0] = problem.space.start
+        if self.start == "model":
+            first[0] = problem.space.start
 
         def losses(cube: np.ndarray) -> np.ndarray:
-            values = problem.losses(cube)
             log.share += 1.0 / self.iterations
-            log.add(cube, values)
-            return values
+            return log.evaluate(problem, cube)
 
         try:
-            with _contained(int(rng.integers(2**31))):
+            with own_randomness(rng), _unlogged():
                 from pyswarms.single.global_best import GlobalBestPSO
 
                 swarm = GlobalBestPSO(
@@ -73,20 +82,17 @@ class ParticleSwarm:
 
 
 @contextmanager
-def _contained(seed: int) -> Iterator[None]:
-    """Keep pyswarms to itself: it draws from numpy's global state and opens a log file where it runs."""
-    state = np.random.get_state()
+def _unlogged() -> Iterator[None]:
+    """Keep pyswarms from opening a log file where it runs, and from setting the level of all logging."""
     configured = os.environ.get("LOG_CFG")
     level = logging.getLogger().level
     with tempfile.TemporaryDirectory() as folder:
         quiet = Path(folder, "logging.yaml")
         quiet.write_text("version: 1\ndisable_existing_loggers: false\n")
         os.environ["LOG_CFG"] = str(quiet)
-        np.random.seed(seed)
         try:
             yield
         finally:
-            np.random.set_state(state)
             logging.getLogger().setLevel(level)
             os.environ.pop("LOG_CFG")
             if configured is not None:

@@ -1,13 +1,20 @@
 """What every optimizer shares: its budget, its history, and how it is watched and stopped."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
 from wipx.core.results import SearchHistory
 from wipx.identify.problem import Problem
+
+POINTS = 2000  # of a history, at most
+HOPELESS = 1e30  # loss that a method is told where there is none
+
+Start = Literal["random", "model"]
 
 
 class BudgetSpentError(Exception):
@@ -77,7 +84,7 @@ class Log:
         evaluations: Budget.
         seconds: Budget [s].
         watcher: Told of every batch.
-        share: Part of the search that is done; the optimizer keeps it.
+        share: Part of the search that is done: of the budget, or more where the optimizer knows better.
     """
 
     optimizer: str
@@ -91,6 +98,21 @@ class Log:
     best_loss: float = np.inf
     best: np.ndarray | None = None
     course: list[tuple[int, float, float]] = field(default_factory=list)
+    calls: int = 0
+    stride: int = 1  # calls per point of the course; doubled where it would grow too long
+
+    def evaluate(self, problem: Problem, cube: np.ndarray) -> np.ndarray:
+        """Losses (P,) of positions (P, D), computed in one call and noted; never more than the budget allows.
+
+        A position without a finite loss gets one that every other undercuts, with which any method can reckon.
+
+        Raises:
+            BudgetSpentError: the budget of evaluations or seconds is used up.
+        """
+        allowed = cube[: max(self.evaluations - self.count, 1)]
+        losses = np.asarray(problem.losses(allowed), dtype=float)
+        self.add(allowed, losses)
+        return np.where(np.isfinite(losses), losses, HOPELESS)
 
     def add(self, cube: np.ndarray, losses: np.ndarray) -> None:
         """Note the losses (P,) of positions (P, D).
@@ -113,8 +135,13 @@ class Log:
         """
         self.count += evaluations
         spent = time.monotonic() - self.began
-        self.course.append((self.count, spent, self.best_loss))
-        self.watcher(Progress(self.count, spent, self.best_loss, min(self.share, 1.0)))
+        if self.calls % self.stride == 0:
+            self.course.append((self.count, spent, self.best_loss))
+        self.calls += 1
+        if len(self.course) == POINTS:
+            self.course, self.stride = self.course[::2], 2 * self.stride
+        self.share = min(max(self.share, self.count / self.evaluations, spent / self.seconds), 1.0)
+        self.watcher(Progress(self.count, spent, self.best_loss, self.share))
         if self.count >= self.evaluations or spent >= self.seconds:
             raise BudgetSpentError
 
@@ -122,7 +149,7 @@ class Log:
         """The result so far."""
         if self.best is None:
             raise ValueError("a search needs at least one evaluation")
-        course = np.array(self.course)
+        course = np.array([*self.course, (self.count, time.monotonic() - self.began, self.best_loss)])
         history = SearchHistory(self.optimizer, course[:, 0].astype(int), course[:, 1], course[:, 2], stopped)
         return Minimum(self.best, self.best_loss, history, self.failed)
 
@@ -131,3 +158,20 @@ class Log:
         if self.count >= self.evaluations:
             return f"budget of {self.evaluations} evaluations"
         return f"budget of {self.seconds:g} s"
+
+
+def first_position(problem: Problem, start: Start, rng: np.random.Generator) -> np.ndarray:
+    """Where a search begins, shape (D,): drawn evenly from the cube, or the model's own start."""
+    return problem.space.start if start == "model" else rng.random(len(problem.space.free))
+
+
+@contextmanager
+def own_randomness(rng: np.random.Generator) -> Iterator[int]:
+    """A seed for a library that draws from numpy's global state, which is put back afterwards."""
+    state = np.random.get_state()
+    seed = int(rng.integers(1, 2**31))
+    np.random.seed(seed)
+    try:
+        yield seed
+    finally:
+        np.random.set_state(state)
