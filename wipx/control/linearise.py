@@ -1,20 +1,25 @@
-"""Linear models about the rest position q = 0."""
+"""Linear models about rest: of the rigid body alone, and of a completed model."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.core.load import BALANCE
 from wipx.core.model import Model, ModelBatch
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
 STEP = 1e-5  # [s] of one simulated step, from which accelerations are read off
 REACH = 1e-4  # [m, rad, m/s, rad/s, N, N m] of the differences
+# Effects with a slope at rest. Dry friction, dead zone and backlash have none, and sensors do not move a robot.
+SMOOTH = frozenset(
+    {"viscous", "payload", "inertia", "rotor_inertia", "com_offset", "gain", "back_emf", "spring", "rail_tilt"}
+)
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """y' = A y + B u with y = [coordinates, rates] about q = 0 (paper, Sec. III).
+    """y' = A y + B u with y = [coordinates, rates] about rest (paper, Sec. III).
 
     Attributes:
         a: Shape (2 joints, 2 joints).
@@ -26,16 +31,38 @@ class LinearModel:
 
 
 def linearise(model: Model) -> LinearModel:
-    """The rigid body of a model, without its effects, by differences of simulated accelerations."""
-    bare = Model(model.plant, model.parameters, {})
+    """The rigid body of a model about q = 0, without its effects, by differences of simulated accelerations."""
+    return _slopes(Model(model.plant, model.parameters, {}), 0.0)
+
+
+def linearise_completed(model: Model) -> LinearModel:
+    """A model with those of its effects that have a slope at rest, about the pitch at which it balances.
+
+    Lags and delays of the actuator are no part of it; see `wipx.control.sampled`. Of the paper's friction (Eq. 5) only
+    the viscous part is: what a joint feels that moves beyond the dead zone.
+    """
+    effects = {name: dict(values) for name, values in model.effects.items() if name.rpartition("/")[2] in SMOOTH}
+    for name, values in model.effects.items():
+        site, _, kind = name.partition("/")
+        if kind == "lagged_stribeck":
+            viscous = effects.setdefault(f"{site}/viscous", {"sigma": 0.0})
+            viscous["sigma"] += values["sigma"]
+    balance = effects.get(BALANCE, {}).get("theta_eq", 0.0)
+    return _slopes(Model(model.plant, model.parameters, effects), balance)
+
+
+def _slopes(model: Model, pitch: float) -> LinearModel:
+    """Slopes of a model's accelerations at rest, its angle against gravity being `pitch` [rad]."""
     joints, inputs = len(model.plant.joints), len(model.plant.commands)
     size = 2 * joints + inputs
     moves = REACH * np.concatenate([np.eye(size), -np.eye(size)])
     window = Inputs.regular(STEP, 1.0 / STEP, inputs, 2 * size)
     commands = moves[:, 2 * joints :].T[None]
-    initial = moves[:, : 2 * joints].T[:, None, :]
+    initial = moves[:, : 2 * joints].T[:, None, :].copy()
+    if "theta" in model.plant.coordinates:
+        initial[model.plant.coordinates.index("theta")] += pitch
     run = AnalyticSimulator(STEP).replay(
-        ModelBatch(bare), Inputs(window.t, commands, window.first, window.last), initial
+        ModelBatch(model), Inputs(window.t, commands, window.first, window.last), initial
     )
     accelerations = (run.rates[1] - run.rates[0])[:, 0] / STEP
     slopes = (accelerations[:, :size] - accelerations[:, size:]) / (2.0 * REACH)
