@@ -1,4 +1,4 @@
-"""Speed and memory of the simulator and the identification, beside a physics engine.
+"""Speed and memory of the simulator, the identification and the estimators, beside physics engines.
 
 Times are processor times, which other work on the machine disturbs little; compare the ratios
 of one run. The figures are also written to runs/bench/bench.json.
@@ -10,6 +10,7 @@ import platform
 from pathlib import Path
 
 from engines import measure_engines
+from estimators import measure_estimators
 from identification import measure_identification
 from kernel import measure_compilation, measure_kernel
 
@@ -26,6 +27,7 @@ def main() -> None:
         "engines": measure_engines(),
         "compilation": measure_compilation(),
         "identification": measure_identification(),
+        "estimators": measure_estimators(),
     }
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
     RESULTS.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

@@ -21,15 +21,19 @@ class Method:
             armature and motor gear, which every physics engine has.
         values: `nominal`; `optimised`: those that match the recordings best; `random`: drawn by
             `ParameterSpace.sample`.
+        effects: Further effects of `friction`, beside effects=[...], as "site/kind".
         reach: Share of the search intervals over which random numbers are spread; a robot whose friction is as large as
             what drives it does not move at all.
     """
 
     physics: Literal["none", "friction", "built_in"]
     values: Literal["nominal", "optimised", "random"]
+    effects: tuple[str, ...] = ()
     reach: float = 0.1
 
     def __post_init__(self) -> None:
+        if self.effects and self.physics != "friction":
+            raise InputError(f"method.effects belongs to physics=friction, not to {self.physics}; leave it out")
         if not 0.0 < self.reach <= 1.0:
             raise InputError(f"method.reach is {self.reach:g}, expected a share in (0, 1]")
         if (self.physics == "none") != (self.values == "nominal"):
@@ -51,7 +55,7 @@ class Method:
         if self.physics == "none":
             return ()
         if self.physics == "friction":
-            return tuple(dict.fromkeys((*friction.switched_on(model, None), *effects)))
+            return tuple(dict.fromkeys((*friction.switched_on(model, None), *self.effects, *effects)))
         return tuple(name for name in built_in(model.plant) if name not in model.effects)
 
 
