@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from wipx.core.errors import check_positive
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.hardware.excitations import KINDS, excitation
@@ -15,10 +15,10 @@ from wipx.hardware.target import Target, Trial
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.sim.simulator import StateFeedback
 from wipx.tasks.identify import Identify
 from wipx.tasks.job import Job
 from wipx.tasks.results import write_csv, written_together
+from wipx.tasks.trials import recording_controller, write_robot
 
 FITTED = tuple(f"r{i}.csv" for i in range(1, 7))
 FRESH = tuple(f"fresh{i}.csv" for i in range(1, 4))
@@ -48,15 +48,19 @@ class Pipeline:
 
     def run(self, job: Job) -> None:
         """Record, identify, judge, write."""
-        target: Target = job.part("target")
+        target: Target | RecordingSource = job.part("target")
+        if isinstance(target, RecordingSource):
+            raise InputError(
+                "task=pipeline runs a robot; use task=diagnose or task=identify recordings.path=... for recordings"
+            )
         nominal: Model = job.part("plant").nominal(target.nominal())
-        controller = job.part("controller")
+        controller = recording_controller(job)
         rng = np.random.default_rng(job.seed)
         trials = [self._trial(k, name, nominal, rng) for k, name in enumerate((*FITTED, *FRESH))]
         print(f"recording {len(trials)} runs of a {nominal.plant.kind} ({type(target).__name__}) ...")
         with written_together(job.out) as folder:
             (folder / "recordings").mkdir()
-            _write_robot(folder / "recordings" / "robot.yaml", nominal, controller.feedback(nominal), controller.rate)
+            write_robot(folder / "recordings" / "robot.yaml", nominal, controller, {})
             for recording in target.run(trials, controller.loop(nominal), rng):
                 slow = logged_slower(recording, self.log_every)
                 write_csv(folder / "recordings" / slow.name, dict(slow.columns))
@@ -88,16 +92,6 @@ def logged_slower(recording: Recording, every: int) -> Recording:
         else:
             columns[name] = values[:rows:every]
     return Recording(recording.name, columns, recording.source, recording.periods * every)
-
-
-def _write_robot(path: Path, nominal: Model, feedback: StateFeedback, rate: float) -> None:
-    gains = feedback.gains.tolist()
-    robot = {
-        "plant": nominal.plant.kind,
-        "parameters": dict(nominal.parameters),
-        "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": rate},
-    }
-    _write_yaml(path, robot)
 
 
 def _write_yaml(path: Path, content: dict[str, Any]) -> None:

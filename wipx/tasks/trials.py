@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,15 @@ import numpy as np
 import yaml
 from tqdm import tqdm
 
-from wipx.core.errors import check_positive
+from wipx.control.lqr import Lqr
+from wipx.core.errors import InputError, check_positive
+from wipx.core.load import Load
+from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.hardware.target import Target, Trial
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.sim.simulator import StateFeedback
 from wipx.tasks.job import Job
 from wipx.tasks.locked import locked
 from wipx.tasks.results import write_csv
@@ -71,10 +74,10 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
     missing = [(k, trial) for k, trial in enumerate(trials) if not (folder / trial.name).is_file()]
     if not missing:
         return
-    controller = job.part("controller")
+    controller = recording_controller(job)
     nominal = job.part("plant").nominal(target.nominal())
     if not (folder / "robot.yaml").is_file():
-        write_robot(folder / "robot.yaml", target, controller.feedback(nominal), controller.rate)
+        write_robot(folder / "robot.yaml", nominal, controller, target.loads)
     if isinstance(target, EmulatedTestbed):
         write_model(target.hidden().model, hidden_file(folder))
     loop = controller.loop(nominal)
@@ -83,21 +86,32 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
         write_recording(folder / trial.name, recording)
 
 
-def write_robot(path: Path, target: Target, feedback: StateFeedback, rate: float) -> None:
-    """Describe a target's robot, its controller and its loads as robot.yaml."""
-    nominal = target.nominal()
-    gains = feedback.gains.tolist()
+def recording_controller(job: Job) -> Lqr:
+    """The controller with which recordings are made for a model: robot.yaml can describe a state feedback only.
+
+    Raises:
+        InputError: another one was chosen.
+    """
+    controller = job.part("controller")
+    if not isinstance(controller, Lqr):
+        raise InputError("controller: recordings for a model are made under a plain state feedback; use controller=lqr")
+    return controller
+
+
+def write_robot(path: Path, nominal: Model, controller: Lqr, loads: Mapping[str, Load]) -> None:
+    """Describe a robot, its controller and the loads of its recordings as robot.yaml."""
+    gains = controller.feedback(nominal).gains.tolist()
     robot: dict[str, Any] = {
         "plant": nominal.plant.kind,
         "parameters": dict(nominal.parameters),
-        "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": rate},
+        "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": controller.rate},
     }
     if nominal.effects:
         robot["effects"] = {name: dict(values) for name, values in nominal.effects.items()}
-    if target.loads:
+    if loads:
         robot["loads"] = {
             name: {"mass": load.mass, "height": load.height, "side": load.side, "recordings": f"{name}_*.csv"}
-            for name, load in target.loads.items()
+            for name, load in loads.items()
         }
     path.write_text(yaml.safe_dump(robot, sort_keys=False), encoding="utf-8")
 
