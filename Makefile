@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction table-methods table-estimators test test-slow check bench lock clean
+.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction table-methods table-estimators table-control test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -52,11 +52,17 @@ table-estimators: $(READY)  ## the paper's Table II: estimators and lengths (PRO
 	$(PY) -m wipx +experiment=table_estimators$(SUFFIX) -m
 	$(PY) -m wipx task=table_estimators task.folder=runs/table_estimators$(SUFFIX) hydra.run.dir=runs/tables/table_estimators
 
+table-control: $(READY)  ## balancing and tracking under unknown loads: tables, figures, README's animation (PROFILE=full: all scenarios)
+	$(PY) -m wipx +experiment=control$(SUFFIX) -m
+	$(PY) -m wipx +experiment=control_methods$(SUFFIX) -m
+	$(PY) -m wipx task=table_control task.folder=runs/control$(SUFFIX) task.methods=runs/control_methods$(SUFFIX) \
+		task.film=docs/images/control.gif hydra.run.dir=runs/tables/control
+
 fig-friction: $(READY)  ## the paper's Fig. 3: its joint model beside Coulomb and viscous friction
 	$(PY) -m wipx task=friction_figure hydra.run.dir=runs/tables/friction
 
 test: $(READY)  ## run the tests (without the slow ones)
-	$(PY) -m pytest -q -m "not slow"
+	$(PY) -m pytest -q -n auto -m "not slow"
 
 test-slow: $(READY)  ## run the slow tests
 	$(PY) -m pytest -q -m slow

@@ -65,18 +65,21 @@ class Schedule:
         tick_of[np.searchsorted(rows, ticks)] = np.arange(count + 1)
         return cls(ticks, rows, tick_of, np.searchsorted(arrivals, rows, side="right") - 1)
 
-    def inputs(self, commands: int) -> Inputs:
-        """The rows as an engine takes them."""
-        last = len(self.rows) - 1
-        zero = np.zeros(1, dtype=np.int64)
-        return Inputs(self.rows[:, None], np.zeros((last, commands, 1)), zero, zero + last)
+    def row_at(self, t: float) -> int:
+        """The first row from a time [s] on; the last one where there is none."""
+        return min(int(np.searchsorted(self.rows, t)), len(self.rows) - 1)
+
+    def inputs(self, commands: int, first: int, last: int) -> Inputs:
+        """The rows `first` to `last` as an engine takes them."""
+        rows, zero = last - first, np.zeros(1, dtype=np.int64)
+        return Inputs(self.rows[first : last + 1, None], np.zeros((rows, commands, 1)), zero, zero + rows)
 
 
 class EmulatedTrial:
     """A trial under way.
 
     Args:
-        trial: What is done.
+        trial: What is done; kept as the attribute `trial`.
         loop: Drives the robot.
         hidden: The robot without load.
         schedule: When the loop runs.
@@ -94,7 +97,7 @@ class EmulatedTrial:
         rng: np.random.Generator,
     ) -> None:
         self._plant = plant = hidden.model.plant
-        self._trial, self._loop, self._schedule = trial, loop, schedule
+        self.trial, self._loop, self._schedule = trial, loop, schedule
         self._motors = tuple(Motor.of(hidden.model, site, in_steps=hidden.in_steps) for site in plant.actuated)
         self._sensors = Sensors(hidden, self._motors, schedule.ticks, rng)
         self._torque_noise = hidden.torque_noise * rng.normal(size=(len(schedule.ticks), len(self._motors)))
@@ -132,7 +135,7 @@ class EmulatedTrial:
         self._forces.append(np.array([m.force.limited(u) for m, u in zip(self._motors, commands, strict=True)]))
 
     def _reference(self, t: float) -> np.ndarray:
-        reference = self._trial.reference
+        reference = self.trial.reference
         return np.zeros(2 * len(self._ends)) if reference is None else reference(t)
 
     def recording(self) -> Recording:
@@ -144,7 +147,7 @@ class EmulatedTrial:
         rows = len(self._shown)
         if rows < FEWEST_ROWS:
             raise InputError(
-                f"target=emulated: {self._trial.name}: the robot is at the end of its rail or has fallen when it is "
+                f"target=emulated: {self.trial.name}: the robot is at the end of its rail or has fallen when it is "
                 "released; hold it at another pitch"
             )
         plant, t = self._plant, self._schedule.ticks[:rows]
@@ -153,11 +156,11 @@ class EmulatedTrial:
         columns |= dict(zip(plant.commands, np.array(self._commands).T, strict=True))
         if plant.commands == ("u",):
             columns["u_measured"] = self._reported(rows)
-        if self._trial.reference is not None:
+        if self.trial.reference is not None:
             followed = np.array([self._reference(time) for time in t]).T
             names = [f"{column}_ref" for column in (*plant.coordinates, *plant.rates)]
             columns |= {n: v for n, v in zip(names, followed, strict=True) if n in ("x_ref", "theta_ref", "x_dot_ref")}
-        return Recording(self._trial.name, columns, f"emulated testbed, {self._trial.name}")
+        return Recording(self.trial.name, columns, f"emulated testbed, {self.trial.name}")
 
     def _reported(self, rows: int) -> np.ndarray:
         """What the drive reports: its mean force from each tick to the next, shape (rows,) [N or N m]."""

@@ -15,6 +15,34 @@ Reference = Callable[[float], np.ndarray]
 
 
 @dataclass(frozen=True)
+class LoadChange:
+    """Somebody puts another load on the moving robot, at its speed, or takes it off.
+
+    Attributes:
+        t: When, since the release [s].
+        load: What it carries from then on, a key of `Target.loads`; None for nothing.
+    """
+
+    t: float
+    load: str | None
+
+
+@dataclass(frozen=True)
+class Push:
+    """A blow to the body, so short that nothing moves meanwhile.
+
+    Attributes:
+        t: When, since the release [s].
+        impulse: Along the rail [N s].
+        height: Where it hits, above the wheel axis along the body [m].
+    """
+
+    t: float
+    impulse: float
+    height: float
+
+
+@dataclass(frozen=True)
 class Trial:
     """One run of a robot.
 
@@ -24,6 +52,7 @@ class Trial:
         load: Name of the load on its body, a key of `Target.loads`; None for none.
         pitch: At which it is held until it is released, at rest and at x = 0 [rad].
         reference: Of coordinates and rates over time since the release, shape (2 joints,); None for zero.
+        events: What happens to it meanwhile, in the order of time; real robots have none.
     """
 
     name: str
@@ -31,6 +60,7 @@ class Trial:
     load: str | None = None
     pitch: float = 0.0
     reference: Reference | None = None
+    events: tuple[LoadChange | Push, ...] = ()
 
 
 class Target(Protocol):

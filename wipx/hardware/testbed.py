@@ -2,12 +2,14 @@
 
 It stands in for hardware where there is none. Its recordings are emulated, not real. What is hidden is drawn from a
 seed (`wipx.hardware.hidden`); a command acts when it arrives at the drive, and a robot that reaches the end of its
-rail, or falls, is stopped there.
+rail, or falls, is stopped there. Where something happens to it in a trial, the engine begins anew from the robot's
+coordinates and rates; bristles of its friction and the play of its drive begin relaxed.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -20,8 +22,9 @@ from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
 from wipx.hardware.emulated_trial import EmulatedTrial, RobotStoppedError, Schedule
 from wipx.hardware.hidden import HiddenPhysics, paper_physics, rich_physics
+from wipx.hardware.push import pushed
 from wipx.hardware.settings import settings_from
-from wipx.hardware.target import Trial
+from wipx.hardware.target import LoadChange, Push, Trial
 from wipx.sim.simulator import Simulator
 
 FALLEN = 1.0  # [rad]
@@ -84,19 +87,59 @@ class EmulatedTestbed:
         """Run trials one after the other; see `Target.run`.
 
         Raises:
-            InputError: a trial names a load that there is none of, or the robot falls at once.
+            InputError: a trial names a load that there is none of, its events are out of order, or the robot falls
+                at once.
         """
-        hidden, loads, engine = self.hidden(), self.loads, self._simulator()
+        hidden, engine = self.hidden(), self._simulator()
         for trial in trials:
-            if trial.load is not None and trial.load not in loads:
-                raise unknown_name("load", trial.load, loads, f"target=emulated: {trial.name}")
+            self._check(trial)
         for trial in trials:
-            model = hidden.model if trial.load is None else loads[trial.load].on(hidden.model)
             schedule = Schedule.drawn(trial.duration, loop.rate, self.period_jitter, hidden, rng)
             run = EmulatedTrial(trial, loop, hidden, schedule, {"x": self.rail, "theta": FALLEN}, rng)
             with suppress(RobotStoppedError):  # the log ends there
-                engine.drive(model, schedule.inputs(len(model.plant.commands)), self._released(trial, rng), run.instant)
+                self._move(engine, hidden.model, schedule, run, self._released(trial, rng))
             yield run.recording()
+
+    def _move(
+        self, engine: Simulator, unloaded: Model, schedule: Schedule, run: EmulatedTrial, state: np.ndarray
+    ) -> None:
+        """Move the robot from event to event.
+
+        Args:
+            engine: Moves it.
+            unloaded: The robot without load.
+            schedule: When its loop runs.
+            run: What its loop is shown and commands.
+            state: True coordinates and rates at the release, shape (2 joints,).
+
+        Raises:
+            RobotStoppedError: the robot has reached an end.
+        """
+        model, first = self._carrying(unloaded, run.trial.load), 0
+        for event in run.trial.events:
+            last = schedule.row_at(event.t)
+            state = _driven(engine, model, schedule, run, state, first, last)
+            first = last
+            if isinstance(event, Push):
+                state = pushed(model, state, event)
+            else:
+                model = self._carrying(unloaded, event.load)
+        _driven(engine, model, schedule, run, state, first, len(schedule.rows) - 1)
+
+    def _carrying(self, unloaded: Model, load: str | None) -> Model:
+        return unloaded if load is None else self.loads[load].on(unloaded)
+
+    def _check(self, trial: Trial) -> None:
+        """Refuse what cannot be done before anything moves."""
+        where, loads = f"target=emulated: {trial.name}", self.loads
+        for load in (trial.load, *(event.load for event in trial.events if isinstance(event, LoadChange))):
+            if load is not None and load not in loads:
+                raise unknown_name("load", load, loads, where)
+        times = [0.0, *(event.t for event in trial.events), trial.duration]
+        if any(after <= before for before, after in pairwise(times)):
+            raise InputError(
+                f"{where}: events at {times[1:-1]} s, expected times in order and within 0 to {trial.duration:g} s"
+            )
 
     def _released(self, trial: Trial, rng: np.random.Generator) -> np.ndarray:
         """True coordinates and rates at the release, shape (2 joints,)."""
@@ -119,3 +162,19 @@ class EmulatedTestbed:
         from wipx.sim.bullet import BulletSimulator
 
         return BulletSimulator(step=self.step)
+
+
+def _driven(
+    engine: Simulator,
+    model: Model,
+    schedule: Schedule,
+    run: EmulatedTrial,
+    state: np.ndarray,
+    first: int,
+    last: int,
+) -> np.ndarray:
+    """True coordinates and rates at row `last` of the schedule, shape (2 joints,), from those at row `first`."""
+    if first == last:  # two events between two rows
+        return state
+    moved = engine.drive(model, schedule.inputs(len(model.plant.commands), first, last), state, run.instant)
+    return np.concatenate([moved.coordinates[-1, :, 0, 0], moved.rates[-1, :, 0, 0]])
