@@ -43,7 +43,7 @@ def test_a_changed_seal_is_noticed(sealed: tuple[Sealed, Path]):
         unseal(path, one.key, one.commitment)
 
 
-@pytest.mark.parametrize("key", [Fernet.generate_key().decode(), "no key", ""])
+@pytest.mark.parametrize("key", [Fernet.generate_key().decode(), "no key", ""], ids=("another", "none", "empty"))
 def test_another_key_is_noticed(sealed: tuple[Sealed, Path], key: str):
     one, path = sealed
     with pytest.raises(InputError, match="the seal or the key was changed"):
