@@ -74,7 +74,7 @@ MODELS: dict[str, tuple[Damage, list[str]]] = {
 }
 ARGUMENTS: dict[str, tuple[list[str], list[str]]] = {
     "task": (["task=predit"], ["task", "'predit'", "did you mean predict?"]),
-    "optimizer": (["task=identify", "optimizer=adam"], ["optimizer", "'adam'", "least_squares, pso"]),
+    "optimizer": (["task=identify", "optimizer=adam"], ["optimizer", "'adam'", "least_squares"]),
     "effect": (["task=identify", "effects=[pitch/colomb]"], ["'pitch/colomb'", "did you mean pitch/coulomb?"]),
     "effect of another plant": (
         ["task=identify", "effects=[translation/coulomb]"],
