@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wipx.core.errors import InputError
-from wipx.learn.training_set import PARTS, TrainingSet
+from wipx.learn.training_set import PARTS, SIGNALS, TrainingSet
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SCHEMA = 1
 CARD = b"wipx.training_set"
-SIGNALS = ("x", "theta")
 LOAD = ("mass", "height", "side")
 AGAIN = "remove it and run task=dataset again"
 

@@ -7,8 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from wipx.core.errors import InputError
 from wipx.core.model import Model
-from wipx.learn.training_set import TrainingSet
+from wipx.learn.training_set import SIGNALS, TrainingSet
 from wipx.sim.simulator import Simulator, StateFeedback
 
 COVERAGE = 0.9  # of the intervals
@@ -49,6 +50,30 @@ class Workshop:
     feedback: tuple[StateFeedback, float]
     seed: int
     folder: Path
+
+
+def check_windows(windows: np.ndarray, length: int, period: float) -> None:
+    """Refuse windows that an estimator cannot read.
+
+    Args:
+        windows: Expected: x and theta, shape (N, length, 2) [m, rad].
+        length: Samples of a window.
+        period: Time between them [s].
+
+    Raises:
+        InputError: windows of another length, or with values that are not finite.
+    """
+    if windows.ndim != 3 or windows.shape[1:] != (length, len(SIGNALS)):
+        raise InputError(
+            f"estimator: windows of shape {windows.shape}, expected (N, {length}, 2): the {length} "
+            f"samples of x and theta from the release on, {1e3 * period:.4g} ms apart"
+        )
+    if not np.isfinite(windows).all():
+        window, sample, signal = np.argwhere(~np.isfinite(windows))[0]
+        raise InputError(
+            f"estimator: {SIGNALS[signal]} of window {window}, sample {sample} is "
+            f"{windows[window, sample, signal]}, expected a finite number; fill the gap or drop the window"
+        )
 
 
 class Estimator(Protocol):

@@ -13,7 +13,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.identify.problem import chunks
 from wipx.learn.conformal import half_width
-from wipx.learn.estimator import COVERAGE, PitchEstimate, Watcher, Workshop
+from wipx.learn.estimator import COVERAGE, PitchEstimate, Watcher, Workshop, check_windows
 from wipx.learn.fall import PITCH, START, Bank, Fall, Prior
 from wipx.learn.observed import Parts, Viewing
 
@@ -153,7 +153,7 @@ class LeastSquaresEstimator:
 
     def fitted(self, windows: np.ndarray) -> np.ndarray:
         """The numbers of `wipx.learn.fall` that fit each window, shape (N, 5); arguments as of `estimate`."""
-        self.fall.viewing.check(windows)
+        check_windows(windows, self.length, self.period)
         windows = windows.astype(float)
         moving = self.fall.viewing.moving(windows)
         numbers = self.bank.nearest(windows, moving)

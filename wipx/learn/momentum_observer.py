@@ -16,7 +16,7 @@ import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.learn.conformal import half_width
-from wipx.learn.estimator import COVERAGE, PitchEstimate, Watcher, Workshop
+from wipx.learn.estimator import COVERAGE, PitchEstimate, Watcher, Workshop, check_windows
 from wipx.learn.loaded_body import LoadedBody
 from wipx.learn.observed import Parts, Viewing
 from wipx.learn.training_set import TrainingSet
@@ -219,6 +219,6 @@ class ObserverEstimator:
         Raises:
             InputError: windows of another length, or with values that are not finite.
         """
-        self.filter.viewing.check(windows)
+        check_windows(windows, self.length, self.period)
         pitch = self.line.at(self.filter.balance(windows.astype(float)))
         return PitchEstimate(pitch, pitch - self.half_width, pitch + self.half_width)

@@ -8,8 +8,9 @@ import torch
 from torch import Tensor, nn
 
 from wipx.learn.architecture import Architecture
+from wipx.learn.training_set import SIGNALS
 
-SIGNALS = 2  # x and theta
+CHANNELS = len(SIGNALS)
 
 
 class PitchNetwork(nn.Module):
@@ -28,8 +29,8 @@ class PitchNetwork(nn.Module):
         self.signal_scale: Tensor
         self.pitch_mean: Tensor
         self.pitch_scale: Tensor
-        self.register_buffer("signal_mean", torch.zeros(SIGNALS))
-        self.register_buffer("signal_scale", torch.ones(SIGNALS))
+        self.register_buffer("signal_mean", torch.zeros(CHANNELS))
+        self.register_buffer("signal_scale", torch.ones(CHANNELS))
         self.register_buffer("pitch_mean", torch.zeros(()))
         self.register_buffer("pitch_scale", torch.ones(()))
 
@@ -70,7 +71,7 @@ class Recurrent(nn.Module):
     def __init__(self, architecture: Architecture, length: int) -> None:
         super().__init__()
         cell = nn.LSTM if architecture.kind == "lstm" else nn.GRU
-        self.cells = cell(SIGNALS, architecture.width, architecture.layers, batch_first=True)
+        self.cells = cell(CHANNELS, architecture.width, architecture.layers, batch_first=True)
         self.readout = nn.Linear(architecture.width, 1)
 
     def forward(self, window: Tensor) -> Tensor:
@@ -102,7 +103,7 @@ class TemporalConvolutions(nn.Module):
         super().__init__()
         width, kernel = architecture.width, architecture.kernel or 1
         self.blocks = nn.Sequential(
-            *(CausalBlock(width if k else SIGNALS, width, kernel, 2**k) for k in range(architecture.layers))
+            *(CausalBlock(width if k else CHANNELS, width, kernel, 2**k) for k in range(architecture.layers))
         )
         self.readout = nn.Linear(width, 1)
 
@@ -139,7 +140,7 @@ class Transformer(nn.Module):
     def __init__(self, architecture: Architecture, length: int) -> None:
         super().__init__()
         width = architecture.width
-        self.embedding = nn.Linear(SIGNALS, width)
+        self.embedding = nn.Linear(CHANNELS, width)
         self.positions: Tensor
         self.register_buffer("positions", torch.as_tensor(sinusoids(length, width), dtype=torch.float32))
         self.blocks = nn.Sequential(
@@ -162,7 +163,7 @@ class StridedConvolutions(nn.Module):
         width, kernel = architecture.width, architecture.kernel or 1
         layers: list[nn.Module] = []
         for k in range(architecture.layers):
-            layers += [nn.Conv1d(width if k else SIGNALS, width, kernel, stride=2, padding=kernel // 2), nn.ReLU()]
+            layers += [nn.Conv1d(width if k else CHANNELS, width, kernel, stride=2, padding=kernel // 2), nn.ReLU()]
             length = (length + 1) // 2
         self.convolutions = nn.Sequential(*layers, nn.Flatten())
         self.readout = nn.Sequential(nn.Linear(width * length, width), nn.ReLU(), nn.Linear(width, 1))

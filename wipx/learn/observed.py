@@ -8,10 +8,9 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.learn.conformal import rank
 from wipx.learn.dataset import FALLEN
-from wipx.learn.estimator import COVERAGE
+from wipx.learn.estimator import COVERAGE, check_windows
 from wipx.learn.training_set import TrainingSet
 
-SIGNALS = ("x", "theta")
 PLACED = 1e-3  # [m, rad] to which a robot is placed at least
 FEWEST = 10  # robots, whose loads give a mean and a covariance of three numbers
 
@@ -43,26 +42,8 @@ class Viewing:
         rail, lean = _size(training.card, "rail", "m"), _size(training.card, "lean", "rad")
         release = (PLACED, max(lean / np.sqrt(3.0), PLACED))  # a lean is drawn uniformly
         viewing = cls(training.windows.shape[1], training.period, (rail, FALLEN), release)
-        viewing.check(training.windows)
+        check_windows(training.windows, viewing.length, viewing.period)
         return viewing
-
-    def check(self, windows: np.ndarray) -> None:
-        """Refuse windows that cannot be read.
-
-        Raises:
-            InputError: windows of another length, or with values that are not finite.
-        """
-        if windows.ndim != 3 or windows.shape[1:] != (self.length, len(SIGNALS)):
-            raise InputError(
-                f"estimator: windows of shape {windows.shape}, expected (N, {self.length}, 2): the {self.length} "
-                f"samples of x and theta from the release on, {1e3 * self.period:.4g} ms apart"
-            )
-        if not np.isfinite(windows).all():
-            window, sample, signal = np.argwhere(~np.isfinite(windows))[0]
-            raise InputError(
-                f"estimator: {SIGNALS[signal]} of window {window}, sample {sample} is "
-                f"{windows[window, sample, signal]}, expected a finite number; fill the gap or drop the window"
-            )
 
     def moving(self, windows: np.ndarray) -> np.ndarray:
         """Which samples show a moving robot, not the last place of one that was stopped, shape (N, L).

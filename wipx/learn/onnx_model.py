@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wipx.core.errors import InputError
-from wipx.learn.estimator import PitchEstimate
+from wipx.learn.estimator import PitchEstimate, check_windows
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -85,23 +85,10 @@ class NetworkEstimator:
         Raises:
             InputError: windows of another length, or with values that are not finite.
         """
-        self._check(windows)
+        check_windows(windows, self.length, self.period)
         (pitch,) = self.session.run(None, {"windows": windows.astype(np.float32)})
         pitch = np.asarray(pitch, dtype=float)
         return PitchEstimate(pitch, pitch - self.card.half_width, pitch + self.card.half_width)
-
-    def _check(self, windows: np.ndarray) -> None:
-        if windows.ndim != 3 or windows.shape[1:] != (self.length, 2):
-            raise InputError(
-                f"estimator: windows of shape {windows.shape}, expected (N, {self.length}, 2): the {self.length} "
-                f"samples of x and theta from the release on, {1e3 * self.period:.4g} ms apart"
-            )
-        if not np.isfinite(windows).all():
-            window, sample, signal = np.argwhere(~np.isfinite(windows))[0]
-            raise InputError(
-                f"estimator: {('x', 'theta')[signal]} of window {window}, sample {sample} is "
-                f"{windows[window, sample, signal]}, expected a finite number; fill the gap or drop the window"
-            )
 
 
 def export(network: "PitchNetwork", card: NetworkCard, path: Path) -> NetworkEstimator:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 PARTS = ("train", "validation", "test")
+SIGNALS = ("x", "theta")
 
 
 @dataclass(frozen=True)
