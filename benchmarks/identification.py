@@ -102,7 +102,7 @@ def small_problem(objective: MultiStep | PaperTrajectories) -> tuple[WindowProbl
     plant = plant_of("wip")
     nominal = Model(plant, plant.complete(BODY, "benchmark"), {})
     truth = nominal.with_effects(dict.fromkeys(SWITCHED_ON, PAPER))
-    feedback = Lqr(rate_filter=None).feedback(nominal)
+    feedback = Lqr().feedback(nominal)
     recordings = _record(truth, feedback, np.random.default_rng(1))
     scales = scales_of(nominal, recordings)
     neutral = nominal.with_effects({name: effect_of(name, plant).neutral for name in SWITCHED_ON})
@@ -185,7 +185,7 @@ def _friction(speed: float) -> float:
 def bullet_evaluation() -> float:
     """Processor time of one candidate, that is of all recordings, in the loop [s]."""
     plant = plant_of("wip")
-    gains = Lqr(rate_filter=None).feedback(Model(plant, plant.complete(BODY, "benchmark"), {})).gains[0]
+    gains = Lqr().feedback(Model(plant, plant.complete(BODY, "benchmark"), {})).gains[0]
     with bullet_loop() as loop:
         paper_rollout(loop, gains)
         return RECORDINGS * float(np.median([processor_time(lambda: paper_rollout(loop, gains)) for _ in range(LOOPS)]))

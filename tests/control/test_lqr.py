@@ -26,7 +26,7 @@ def test_gains_solve_the_riccati_equation():
 
 
 def test_settings_reach_the_feedback():
-    feedback = Lqr(rate_filter=None, limit=7.0).feedback(robot("wip"))
+    feedback = Lqr(limit=7.0).feedback(robot("wip"))
     assert feedback.rate_filter is None
     assert feedback.limit == 7.0
     assert feedback.gains.shape == (1, 4)

@@ -61,7 +61,7 @@ def nominal_model(kind: str) -> Model:
 def controller(kind: str) -> StateFeedback:
     """A regulator on noiseless rates: the noise of the recordings is the sensors' alone."""
     gentle = 10.0 if kind == "double_pendulum" else 0.2  # its light links would chatter at 250 Hz
-    return Lqr(command=gentle, rate_filter=None).feedback(nominal_model(kind))
+    return Lqr(command=gentle).feedback(nominal_model(kind))
 
 
 def sensor_deviations(model: Model) -> np.ndarray:

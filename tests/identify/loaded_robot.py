@@ -23,7 +23,7 @@ RATE, DURATION = 650.0, 1.25  # [Hz, s] paper: controller of 600 to 700 Hz, traj
 NOISE = np.array([5e-4, 1e-3])  # [m, rad]
 PLACEMENT = 2e-3  # [rad] scatter of the pitch from which a trial is released
 NOMINAL = nominal_model("wip")
-FEEDBACK = Lqr(rate_filter=None).feedback(NOMINAL)
+FEEDBACK = Lqr().feedback(NOMINAL)
 SIMULATOR = AnalyticSimulator(step=2e-3, threads=1)  # one step per row of the controller
 FRICTION = ("translation/lagged_stribeck", "pitch/lagged_stribeck")
 PAPER = {"F_s": 0.15, "F_c": 0.12, "v_s": 0.2, "sigma": 0.02, "epsilon": 0.01, "alpha": 0.7}  # paper, Fig. 3

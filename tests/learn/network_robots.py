@@ -19,7 +19,7 @@ LENGTH = 40
 BODY = {"body_mass": 5.0, "wheel_mass": 1.2, "com_height": 0.35, "body_inertia": 0.15}
 WHEEL = {"wheel_inertia": 0.0023, "wheel_radius": 0.0625}
 WIP = Model(plant_of("wip"), plant_of("wip").complete({**BODY, **WHEEL}, "test"), {})
-REGULATOR = (Lqr(rate_filter=None).feedback(WIP), 650.0)
+REGULATOR = (Lqr().feedback(WIP), 650.0)
 SIMULATOR = AnalyticSimulator(step=2e-3, threads=1)  # one step per row of the regulator
 SMALL = {
     "lstm": NetworkRecipe("lstm", width=16, layers=1, epochs=15, batch=32, learning_rate=1e-2),

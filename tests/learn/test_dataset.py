@@ -21,7 +21,7 @@ BODY = {"body_mass": 5.0, "wheel_mass": 1.2, "com_height": 0.35, "body_inertia":
 WHEEL = {"wheel_inertia": 0.0023, "wheel_radius": 0.0625}
 WIP = Model(plant_of("wip"), plant_of("wip").complete({**BODY, **WHEEL}, "test"), {})
 COULOMB = {"translation/coulomb": {"F_c": 2.0}, "pitch/coulomb": {"F_c": 0.1}}
-REGULATOR = (Lqr(rate_filter=None).feedback(WIP), 650.0)
+REGULATOR = (Lqr().feedback(WIP), 650.0)
 SIMULATOR = AnalyticSimulator(step=2e-3, threads=1)  # one step per row of the regulator
 QUIET = ObservationNoise(amplitude=0.0)
 PITCH_RESOLUTION = 2e-7  # rad; of the bisection

@@ -1,5 +1,7 @@
 """The loop: state feedback in compiled code, and any Python controller around the same physics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sim.robots import robot
@@ -35,7 +37,7 @@ def loop(
 
 @pytest.fixture(scope="module")
 def feedback() -> StateFeedback:
-    return Lqr(rate_filter=None).feedback(robot("wip"))
+    return Lqr().feedback(robot("wip"))
 
 
 def test_an_lqr_balances_a_tilted_wip(feedback: StateFeedback):
@@ -45,7 +47,7 @@ def test_an_lqr_balances_a_tilted_wip(feedback: StateFeedback):
 
 
 def test_an_lqr_with_filtered_differences_balances_the_real_robot_too():
-    run = loop(robot("wip", REAL), Lqr(rate_filter=0.005).feedback(robot("wip")))
+    run = loop(robot("wip", REAL), replace(Lqr().feedback(robot("wip")), rate_filter=0.005))
     assert np.max(np.abs(run.coordinates[:, 1])) < 0.2
 
 
@@ -125,7 +127,7 @@ def test_both_commands_of_a_double_pendulum_are_fed_back():
 
 
 def test_a_pendulum_is_held_upright_by_its_own_torque():
-    feedback = Lqr(coordinates=(100.0,), rates=(5.0,), rate_filter=None).feedback(robot("pendulum"))
+    feedback = Lqr(coordinates=(100.0,), rates=(5.0,)).feedback(robot("pendulum"))
     inputs = Inputs.regular(3.0, 500.0, 1)
     run = AnalyticSimulator().close_loop(
         ModelBatch(robot("pendulum")), inputs, np.array([0.3, 0.0])[:, None, None], feedback, np.zeros((1500, 2, 1))

@@ -112,7 +112,7 @@ def test_the_closed_loop_with_the_papers_friction_agrees(engine: SteppedSimulato
     initial[1] = rng.uniform(-0.08, 0.08, (2, 2))
     references = np.zeros((len(inputs.t) - 1, 4, 2))
     noise = 1e-4 * rng.normal(size=(len(inputs.t) - 1, 4, 2, 2))
-    feedback = Lqr(rate_filter=0.005).feedback(robot("wip"))
+    feedback = replace(Lqr().feedback(robot("wip")), rate_filter=0.005)
     ours, theirs = (sim.close_loop(batch, inputs, initial, feedback, references, noise) for sim in (ANALYTIC, engine))
     np.testing.assert_allclose(theirs.coordinates, ours.coordinates, rtol=0.0, atol=AGREED)
     np.testing.assert_allclose(theirs.commands, ours.commands, rtol=0.0, atol=0.1)
@@ -123,7 +123,7 @@ def test_a_python_controller_drives_every_engine(engine: SteppedSimulator, fresh
     t = uneven(np.random.default_rng(fresh_seed), 60)
     inputs = Inputs.of([t], [np.zeros((len(t), 1))], [0])
     late = {"actuator/delay": {"tau": 0.006}, "sensor_theta/delay": {"tau": 0.004}, "actuator/lag": {"tau": 0.003}}
-    gains = Lqr(rate_filter=None).feedback(robot("wip")).gains
+    gains = Lqr().feedback(robot("wip")).gains
     ours, theirs = (
         sim.drive(robot("wip", late), inputs, np.array(LIVELY["wip"]), lambda _, measured: -gains @ measured)
         for sim in (ANALYTIC, engine)

@@ -13,14 +13,7 @@ from wipx.sim.simulator import StateFeedback
 
 @dataclass(frozen=True)
 class LqrDesign(QuadraticCost):
-    """u = -K (y - y_ref), K minimising the cost.
-
-    Attributes:
-        rate_filter: Time constant of the low-pass on differenced coordinates in `feedback` [s]; None where the
-            rates are measured.
-    """
-
-    rate_filter: float | None = 0.005
+    """u = -K (y - y_ref), K minimising the cost."""
 
     def feedback(self, model: Model) -> StateFeedback:
         """The gains for a model's rigid body.
@@ -30,7 +23,7 @@ class LqrDesign(QuadraticCost):
         """
         linear = linearise(model)
         gains = optimal_gains(linear.a, linear.b, *self.weights(model))
-        return StateFeedback(gains, self.rate_filter, self.limit)
+        return StateFeedback(gains, limit=self.limit)
 
     def law(self, model: Model) -> LinearLaw:
         """The same gains as a linear law.
