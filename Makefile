@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction table-methods table-estimators table-control test test-slow check bench lock clean
+.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -60,6 +60,9 @@ table-control: $(READY)  ## balancing and tracking under unknown loads: tables, 
 
 fig-friction: $(READY)  ## the paper's Fig. 3: its joint model beside Coulomb and viscous friction
 	$(PY) -m wipx task=friction_figure hydra.run.dir=runs/tables/friction
+
+fig-margins: $(READY)  ## stability margins of all controllers, and the loads from which they recover
+	$(PY) -m wipx +experiment=margins
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(PY) -m pytest -q -n auto -m "not slow"

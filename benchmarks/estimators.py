@@ -37,8 +37,8 @@ def measure_estimators(names: tuple[str, ...] = NETWORKS) -> dict[str, dict[str,
     import torch
 
     torch.set_num_threads(1)
-    recipes = {name: _preset(name) for name in names}
-    sizes = {name: _untrained(recipe) for name, recipe in recipes.items()}
+    recipes = {name: preset(name) for name in names}
+    sizes = {name: untrained(recipe) for name, recipe in recipes.items()}
     window = np.zeros((1, LENGTH, 2))
     latencies = interleaved({n: lambda e=e: e.estimate(window) for n, (e, _) in sizes.items()}, ANSWERS)
     results, lines = {}, []
@@ -56,13 +56,14 @@ def measure_estimators(names: tuple[str, ...] = NETWORKS) -> dict[str, dict[str,
     return results
 
 
-def _preset(name: str) -> NetworkRecipe:
+def preset(name: str) -> NetworkRecipe:
+    """The network of an option of `estimator`."""
     settings = yaml.safe_load((PRESETS / f"{name}.yaml").read_text(encoding="utf-8"))
     settings.pop("_target_")
     return NetworkRecipe(**settings)
 
 
-def _untrained(recipe: NetworkRecipe) -> tuple[NetworkEstimator, int]:
+def untrained(recipe: NetworkRecipe) -> tuple[NetworkEstimator, int]:
     """An estimator as fast as a trained one, and the number of its weights."""
     from wipx.learn.networks import PitchNetwork
 

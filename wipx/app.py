@@ -23,7 +23,7 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
-from wipx.tasks.finished import ERROR
+from wipx.tasks.finished import ERROR, SETTINGS
 from wipx.tasks.job import Job
 
 ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
@@ -111,9 +111,10 @@ def run_task(config: DictConfig, out: Path) -> None:
         settings=settings,
         chosen=dict(HydraConfig.get().runtime.choices) if HydraConfig.initialized() else {},
         sweep=sweep_of(out),
+        overrides=tuple(HydraConfig.get().overrides.task) if HydraConfig.initialized() else (),
     )
     part("task").run(job)
-    OmegaConf.save(OmegaConf.create(settings), out / "config.yaml")
+    OmegaConf.save(OmegaConf.create(settings), out / SETTINGS)
 
 
 def sweep_of(out: Path) -> Path | None:

@@ -99,3 +99,27 @@ def test_the_friction_figure_shows_the_papers_curve(program: Program, tmp_path: 
     refused = program("task=friction_figure", "task.zeta.F_x=1", "hydra.run.dir=bad")
     assert refused.status == 2
     assert "F_x" in refused.error
+
+
+def test_a_model_that_was_completed_before_is_taken_as_it_is(program: Program, tmp_path: Path):
+    assert program("task=adapt", "method=ours", *ROBOT, *SEARCH, "hydra.run.dir=ours").status == 0
+    path = "model.path=ours/model.yaml"
+    taken = program("task=adapt", "method=diagnosed", path, *ROBOT, "hydra.run.dir=taken")
+    assert taken.status == 0, taken.error
+    before, after = result(tmp_path / "ours"), result(tmp_path / "taken")
+    assert after["held_out"]["value"] == pytest.approx(before["held_out"]["value"], rel=1e-9)
+    assert after["fit"]["value"] == pytest.approx(before["fit"]["value"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("method=diagnosed",), "give model.path=FOLDER/model.yaml"),
+        (("method=pure_sim", "model.path=m.yaml"), "choose method=diagnosed"),
+        (("method=diagnosed", "model.path=m.yaml"), "m.yaml"),
+    ],
+)
+def test_a_model_and_a_method_that_do_not_fit_are_refused(program: Program, arguments: tuple[str, ...], expected: str):
+    answer = program("task=adapt", *arguments, *ROBOT, "hydra.run.dir=bad")
+    assert answer.status == 2
+    assert expected in answer.error

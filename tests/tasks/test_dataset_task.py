@@ -91,10 +91,10 @@ def datasets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_training_set_is_made_once_and_shared(trials: Path, datasets: Path):
-    training, model = training_set_of(job(trials, datasets, "random"), SMALL)
+    training, model, _ = training_set_of(job(trials, datasets, "random"), SMALL)
     (made,) = datasets.glob("*.parquet")
     before = made.stat().st_mtime_ns
-    again, again_model = training_set_of(job(trials, datasets, "random"), SMALL)
+    again, again_model, _ = training_set_of(job(trials, datasets, "random"), SMALL)
     assert made.stat().st_mtime_ns == before
     assert again.card == training.card
     assert again_model == model
@@ -102,7 +102,7 @@ def test_a_training_set_is_made_once_and_shared(trials: Path, datasets: Path):
 
 
 def test_random_numbers_are_drawn_afresh_for_every_robot(trials: Path, datasets: Path):
-    training, model = training_set_of(job(trials, datasets, "random"), SMALL)
+    training, model, _ = training_set_of(job(trials, datasets, "random"), SMALL)
     simulations: Any = training.card["simulations"]
     assert simulations["count"] == 60
     assert set(model.effects) == {

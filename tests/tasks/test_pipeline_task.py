@@ -1,16 +1,29 @@
 """The whole chain on the emulated testbed, and the log that it leaves."""
 
+import json
 from pathlib import Path
 
 import numpy as np
-import yaml
+import pytest
 
 from wipx.core.recording import Recording
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.pipeline import FITTED, FRESH, logged_slower
+from wipx.tasks.pipeline import logged_slower
 
-SHORT = ("task.duration=1.5", "optimizer.starts=1", "optimizer.smoothing=[0.0]", "optimizer.iterations=3")
+SHORT = (
+    "task.fitted=2",
+    "task.fresh=1",
+    "task.duration=2.0",
+    "task.log_every=6",
+    "task.samples=60",
+    "task.loads=[a2]",
+    "task.per_load=1",
+    "task.scenarios=[balancing]",
+    "estimator.epochs=3",
+    "target.engine=analytic",
+    "target.step=5e-4",
+)
 
 
 def test_a_slower_log_has_the_mean_of_the_commands_and_the_rows_between_are_gone():
@@ -25,19 +38,42 @@ def test_a_slower_log_has_the_mean_of_the_commands_and_the_rows_between_are_gone
     assert logged_slower(fast, 1) is fast
 
 
-def test_it_records_identifies_and_tells_what_was_hidden_apart(program, tmp_path: Path):
-    answer = program("task=pipeline", "target.engine=analytic", *SHORT, "hydra.run.dir=out")
-    assert (answer.status, answer.error) == (0, "")
+def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(program, tmp_path: Path):
+    answer = program("task=pipeline", *SHORT, "hydra.run.dir=out")
+    assert answer.status == 0, answer.error
     out = tmp_path / "out"
     recordings = RecordingSource(path=str(out / "recordings")).load()
-    assert {r.name for r in recordings} == {*FITTED, *FRESH}
-    for recording in recordings:
-        assert recording.periods == 2
-        assert 300.0 < recording.rate < 350.0
-    hidden = read_model(out / "hidden.yaml")
-    assert {"translation/lugre", "actuator/backlash"} <= set(hidden.effects)
-    assert yaml.safe_load((out / "hidden_signals.yaml").read_text())["latency"] > 0.0
-    completed = read_model(out / "model.yaml")
-    # Even a short search on little data gets near the friction.
-    level = hidden.value("translation/lugre.F_c")
-    assert 0.5 * level < completed.value("translation/coulomb.F_c") < 1.5 * level
+    assert {r.name for r in recordings} == {"r1.csv", "r2.csv", "fresh1.csv"}
+    assert all(r.periods == 6 and 100.0 < r.rate < 115.0 for r in recordings)
+    found = json.loads((out / "diagnosis" / "diagnosis.json").read_text())
+    assert any(effect["name"].startswith("translation/") for effect in found["effects"])
+    # What the estimator learned in is the completed model, and the truth was not part of it.
+    card = json.loads((out / "estimator" / "result.json").read_text())["result"]["card"]
+    assert card["model"]["effects"] == dict(read_model(out / "diagnosis" / "model.yaml").effects)
+    assert {"translation/lugre", "actuator/backlash"} <= set(read_model(out / "hidden.yaml").effects)
+    page = (out / "story.html").read_text()
+    assert "emulated testbed" in page
+    assert page.count("data:image/png") == 3
+    assert "data:image/gif" in page
+    again = program("task=pipeline", *SHORT, "hydra.run.dir=out")
+    assert again.status == 0, again.error
+    assert again.out == answer.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("friction=paper",), "friction=paper: task=pipeline has no use for it"),
+        (("target=recordings", "target.path=."), "drives a robot"),
+        (("task.loads=[]",), "task.loads is empty"),
+        (("task.fitted=0",), "fitted"),
+    ],
+)
+def test_what_the_chain_cannot_do_is_refused_before_anything_is_recorded(
+    program, tmp_path: Path, arguments: tuple[str, ...], expected: str
+):
+    answer = program("task=pipeline", *arguments, "hydra.run.dir=out")
+    assert answer.status == 2
+    assert expected in answer.error
+    assert len(answer.error.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()

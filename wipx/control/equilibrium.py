@@ -14,6 +14,7 @@ from wipx.control.balance_watch import BalanceWatch, check_carriage
 from wipx.control.ekf import Ekf
 from wipx.control.lqr import LqrDesign
 from wipx.control.regulator import Regulator
+from wipx.control.release_window import ReleaseWindow
 from wipx.control.sampled import check_stabilises
 from wipx.control.soft_update import SoftUpdate
 from wipx.core.errors import check_positive
@@ -114,6 +115,7 @@ class EquilibriumRegulator(Regulator):
         super().__init__(estimator, feedback, settings.rate)
         self._settings = settings
         self._balance_estimator = balance_estimator
+        self._window = ReleaseWindow(balance_estimator.length, balance_estimator.period)
         self._soft = SoftUpdate(settings.alpha, settings.beta)
         self._watch = None if settings.adaptive is None else BalanceWatch(estimator.model, settings.adaptive)
         self._forget(0.0)
@@ -143,9 +145,7 @@ class EquilibriumRegulator(Regulator):
 
     def _collect(self, t: float, measured: np.ndarray) -> None:
         """Keep what the sensors show; the training of estimators shows them the same, and no filter's state."""
-        for rows, value in zip(self._seen, measured[:2], strict=True):
-            if np.isfinite(value):
-                rows.append((t, float(value)))
+        self._window.see(t, measured)
         window = self._balance_estimator
         if t - self._released >= (window.length - 1) * window.period - SLACK:
             self._asked = True
@@ -153,13 +153,11 @@ class EquilibriumRegulator(Regulator):
 
     def _ask(self, t: float) -> None:
         """Ask the estimator, and say what came of it."""
-        window = self._balance_estimator
-        if not all(self._seen):
+        samples = self._window.samples()
+        if samples is None:
             self._hold(f"t = {t:.3f} s: a sensor showed nothing yet")
             return
-        times = self._released + np.arange(window.length) * window.period
-        signals = [np.interp(times, *np.array(rows).T) for rows in self._seen]
-        found = window.estimate(np.stack(signals, axis=-1)[None])
+        found = self._balance_estimator.estimate(samples[None])
         pitch, low, high = (float(values[0]) for values in (found.pitch, found.low, found.high))
         said = f"t = {t:.3f} s: equilibrium pitch {pitch:+.4f} rad, 90 % interval {low:+.4f} to {high:+.4f}"
         # Comparisons with NaN are false: an estimate that is none is not trusted.
@@ -176,7 +174,7 @@ class EquilibriumRegulator(Regulator):
 
     def _forget(self, t: float) -> None:
         self._released = self._t = t
-        self._seen: tuple[list[tuple[float, float]], ...] = ([], [])
+        self._window.reset(t)
         self._asked = self._trusted = False
         self.balance = 0.0
         self.notes: tuple[str, ...] = ()

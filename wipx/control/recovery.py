@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise, product
 from math import tan
 
 import numpy as np
@@ -16,6 +17,7 @@ from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Simulator
 
 LoopFor = Callable[[float], Loop]
+Watcher = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,8 @@ class Releases:
     """A grid of loads, and what counts as recovered.
 
     Attributes:
-        masses: Of the loads [kg].
-        pitches: At which the loaded robot balances [rad]; a load's side follows from it.
+        masses: Of the loads, ascending [kg].
+        pitches: At which the loaded robot balances, ascending [rad]; a load's side follows from it.
         height: Of the loads above the wheel axis [m].
         rail: Half its length [m].
         fallen: Pitch at which the robot is stopped [rad].
@@ -46,6 +48,9 @@ class Releases:
         check_positive(rail=self.rail, fallen=self.fallen, duration=self.duration, end=self.end, sway=self.sway)
         if not (self.masses and self.pitches and min(self.masses) > 0.0):
             raise InputError("releases: expected at least one mass above zero and one pitch")
+        for name, values in {"masses": self.masses, "pitches": self.pitches}.items():
+            if any(later <= earlier for earlier, later in pairwise(values)):
+                raise InputError(f"releases.{name} is {list(values)}, expected ascending numbers; sort them")
 
     def load(self, model: Model, mass: float, pitch: float) -> Load:
         """The load of that mass with which the robot balances at that pitch."""
@@ -59,7 +64,11 @@ class _StoppedError(Exception):
 
 
 def recovery_region(
-    loops: Mapping[str, LoopFor], model: Model, simulator: Simulator, releases: Releases
+    loops: Mapping[str, LoopFor],
+    model: Model,
+    simulator: Simulator,
+    releases: Releases,
+    watcher: Watcher = lambda controller, share: None,
 ) -> RecoveryRegion:
     """Release the robot with every load under every controller.
 
@@ -71,23 +80,23 @@ def recovery_region(
         model: The robot without load.
         simulator: The engine.
         releases: What is done.
+        watcher: Told the controller and the share of all releases that is done.
 
     Raises:
         InputError: the model is no body on a carriage.
     """
     check_carriage(model)
+    loads = list(product(releases.masses, releases.pitches))
+    grid = (len(releases.masses), len(releases.pitches))
     found = {}
-    for name, loop_for in loops.items():
-        ends = np.array(
-            [
-                [
-                    _released(loop_for(pitch), releases.load(model, mass, pitch).on(model), simulator, releases)
-                    for pitch in releases.pitches
-                ]
-                for mass in releases.masses
-            ]
-        )
-        found[name] = Recovery(ends[..., 0] > 0.0, ends[..., 1], ends[..., 2])
+    for i, (name, loop_for) in enumerate(loops.items()):
+        ends = np.empty((len(loads), 3))
+        for k, (mass, pitch) in enumerate(loads):
+            watcher(name, (i + k / len(loads)) / len(loops))
+            robot = releases.load(model, mass, pitch).on(model)
+            ends[k] = _released(loop_for(pitch), robot, simulator, releases)
+        recovered, farthest, standing = ends.T.reshape(3, *grid)
+        found[name] = Recovery(recovered > 0.0, farthest, standing)
     return RecoveryRegion(
         np.array(releases.masses), np.array(releases.pitches), releases.height, releases.rail, releases.duration, found
     )

@@ -49,6 +49,7 @@ class ControlTrial:
         recovery: Time after which the robot stays near reference and balance, from where time counts on [s]; None
             where it never does.
         course: Motion.
+        notes: What the controller decided, one line each.
     """
 
     load: str
@@ -62,6 +63,7 @@ class ControlTrial:
     rmse_target: float
     recovery: float | None
     course: Course
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

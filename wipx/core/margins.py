@@ -15,12 +15,14 @@ class Margins:
         gain_high: Factor above which it is not stable; infinite where there is none.
         phase: Phase lag or lead that the loop bears [rad].
         delay: Further delay of the command that it bears [s]; infinite where it bears any.
+        inner: Whether the loop is an inner one, about a balance that is held, of a controller that moves it.
     """
 
     gain_low: float
     gain_high: float
     phase: float
     delay: float
+    inner: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,3 +64,8 @@ class RecoveryRegion:
     rail: float
     duration: float
     controllers: Mapping[str, Recovery]
+
+    @property
+    def loads(self) -> int:
+        """How many loads there are."""
+        return len(self.masses) * len(self.pitches)

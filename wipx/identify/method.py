@@ -8,6 +8,7 @@ from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.identify.friction import IdentifiedFriction, JointFriction
 
+AS_IT_IS = ("none", "completed")  # physics that nothing is searched or drawn for
 BUILT_IN = ("viscous", "coulomb", "rotor_inertia")  # of every joint: what physics engines call damping,
 # friction loss and armature; with the gear of the motor seven numbers for a plant of two joints
 
@@ -18,7 +19,8 @@ class Method:
 
     Attributes:
         physics: `none`; `friction`: the chosen friction and effects=[...]; `built_in`: joint damping, friction loss,
-            armature and motor gear, which every physics engine has.
+            armature and motor gear, which every physics engine has; `completed`: what a model has that was completed
+            before.
         values: `nominal`; `optimised`: those that match the recordings best; `random`: drawn by
             `ParameterSpace.sample`.
         effects: Further effects of `friction`, beside effects=[...], as "site/kind".
@@ -26,7 +28,7 @@ class Method:
             what drives it does not move at all.
     """
 
-    physics: Literal["none", "friction", "built_in"]
+    physics: Literal["none", "friction", "built_in", "completed"]
     values: Literal["nominal", "optimised", "random"]
     effects: tuple[str, ...] = ()
     reach: float = 0.1
@@ -36,11 +38,16 @@ class Method:
             raise InputError(f"method.effects belongs to physics=friction, not to {self.physics}; leave it out")
         if not 0.0 < self.reach <= 1.0:
             raise InputError(f"method.reach is {self.reach:g}, expected a share in (0, 1]")
-        if (self.physics == "none") != (self.values == "nominal"):
+        if (self.physics in AS_IT_IS) != (self.values == "nominal"):
             raise InputError(
                 f"method: physics={self.physics} with values={self.values} leaves nothing to do; "
-                "physics=none goes with values=nominal only"
+                "physics=none and physics=completed go with values=nominal only"
             )
+
+    @property
+    def completes(self) -> bool:
+        """Whether it takes a model that was completed before."""
+        return self.physics == "completed"
 
     def switched_on(
         self, model: Model, friction: JointFriction | IdentifiedFriction, effects: tuple[str, ...]
@@ -52,7 +59,7 @@ class Method:
             friction: The chosen friction.
             effects: Further effects that were switched on, as "site/kind".
         """
-        if self.physics == "none":
+        if self.physics in AS_IT_IS:
             return ()
         if self.physics == "friction":
             return tuple(dict.fromkeys((*friction.switched_on(model, None), *self.effects, *effects)))

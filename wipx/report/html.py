@@ -22,7 +22,7 @@ def render(
     Args:
         template: Its template, which extends `base.html`.
         style: Style sheets, in their order.
-        script: Scripts, in their order; they find `data` and plotly.js.
+        script: Scripts, in their order; they find `data` and plotly.js. A page without scripts has neither.
         data: What the scripts draw; only what JSON can hold.
         content: What the template shows; every text is escaped.
     """
@@ -37,7 +37,7 @@ def render(
     return environment.get_template(template).render(
         style=Markup("".join(map(_source, style))),
         script=Markup("".join(map(_source, script))),
-        plotly=Markup(_plotly()),
+        plotly=Markup(_plotly() if script else ""),
         data=Markup(_json_in_html(data)),
         **content,
     )

@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from wipx.core.margins import Margins, Recovery, RecoveryRegion
 from wipx.report.files import write_whole
-from wipx.report.numbers import significant
+from wipx.report.numbers import compact, significant
 from wipx.report.panels import COMPLETED, GRID, MUTED, NOMINAL, png, quiet
 
 LONGEST_BAR = 100.0  # gain factors beyond it are drawn to here
-COLUMNS = 4
+COLUMNS = 4  # at most
 
 
 def draw_margins(margins: Mapping[str, Margins], path: Path) -> None:
@@ -26,8 +27,9 @@ def draw_margins(margins: Mapping[str, Margins], path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    names, found = list(margins), list(margins.values())
-    figure = Figure(figsize=(10.5, 1.4 + 0.32 * len(names)), layout="constrained")
+    found = list(margins.values())
+    names = [f"{name}\n(inner loop)" if m.inner else name for name, m in margins.items()]
+    figure = Figure(figsize=(10.5, 1.4 + 0.38 * len(names)), layout="constrained")
     gain, phase, delay = figure.subplots(1, 3, sharey=True)
     rows = np.arange(len(names))[::-1]
     low = np.array([max(m.gain_low, 1.0 / LONGEST_BAR) for m in found])
@@ -36,8 +38,11 @@ def draw_margins(margins: Mapping[str, Margins], path: Path) -> None:
     gain.axvline(1.0, color=NOMINAL, linewidth=1.2)
     gain.set_xscale("log")
     for row, end, m in zip(rows, high, found, strict=True):
-        gain.annotate(f" {_factor(m.gain_low)} to {_factor(m.gain_high)}", (end, row), va="center", fontsize=8)
-    gain.set_xlim(0.6 * float(low.min()), 8.0 * float(high.max()))
+        text = f"{_factor(m.gain_low)} to {_factor(m.gain_high)}"
+        gain.annotate(text, (end, row), (4, 0), textcoords="offset points", va="center", fontsize=9)
+    gain.set_xlim(0.6 * float(low.min()), 12.0 * float(high.max()))
+    gain.xaxis.set_major_formatter(FuncFormatter(lambda factor, _: f"{factor:g}"))
+    gain.tick_params(which="minor", bottom=False)
     _bars(phase, rows, np.rad2deg([m.phase for m in found]))
     _bars(delay, rows, np.array([1e3 * m.delay for m in found]))
     for axes, title in ((gain, "gain margin: factors"), (phase, "phase margin [deg]"), (delay, "delay margin [ms]")):
@@ -45,6 +50,7 @@ def draw_margins(margins: Mapping[str, Margins], path: Path) -> None:
         axes.grid(visible=False, axis="y")
         axes.set_title(title, loc="left", fontsize=10, color=MUTED)
     gain.set_yticks(rows, names)
+    figure.suptitle("Margins at the command; filter, limits and dry friction left out", x=0.01, ha="left", fontsize=10)
     write_whole(path, png(figure))
 
 
@@ -54,8 +60,8 @@ def draw_recovery(region: RecoveryRegion, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    columns = min(COLUMNS, len(region.controllers))
-    lines = -(-len(region.controllers) // columns)
+    lines = -(-len(region.controllers) // COLUMNS)
+    columns = -(-len(region.controllers) // lines)
     figure = Figure(figsize=(1.2 + 2.6 * columns, 0.8 + 2.3 * lines), layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     image = None
@@ -64,15 +70,16 @@ def draw_recovery(region: RecoveryRegion, path: Path) -> None:
         axes.set_title(f"{name}: {round(100 * recovery.share)} %", loc="left", fontsize=10, parse_math=False)
     for axes in grid.flat[len(region.controllers) :]:
         axes.set_axis_off()
-    for axes in grid[-1]:
+    for axes in grid.flat[max(0, len(region.controllers) - columns) : len(region.controllers)]:
         axes.set_xlabel("pitch of balance [rad]", color=MUTED)
+        axes.tick_params(labelbottom=True)
     for axes in grid[:, 0]:
         axes.set_ylabel("load [kg]", color=MUTED)
     if image is not None:
         figure.colorbar(image, ax=grid, label="standing distance from x = 0 [m]", shrink=0.8)
     figure.suptitle(
-        f"Recovered loads, on a rail of +-{significant(region.rail)} m; crosses: stopped at its end, fallen, "
-        f"or not calm after {significant(region.duration)} s",
+        f"Recovered loads, on a rail of +-{compact(region.rail)} m; crosses: stopped at its end, fallen, "
+        f"or not calm after {compact(region.duration)} s",
         x=0.01,
         ha="left",
         fontsize=10,
@@ -89,6 +96,7 @@ def _draw_region(axes: Axes, region: RecoveryRegion, recovery: Recovery):
     shown = np.ma.masked_where(~recovery.recovered, recovery.standing)
     image = axes.pcolormesh(*edges, shown, cmap="viridis_r", vmin=0.0, vmax=region.rail)
     lost = np.argwhere(~recovery.recovered)
+    axes.set_yticks(region.masses)
     axes.plot(region.pitches[lost[:, 1]], region.masses[lost[:, 0]], "x", color=NOMINAL, markersize=5)
     return image
 
@@ -105,8 +113,11 @@ def _bars(axes: Axes, rows: np.ndarray, sizes: np.ndarray) -> None:
     """Horizontal bars with their sizes beside them; infinite ones are as long as the longest."""
     longest = float(np.max(sizes[np.isfinite(sizes)], initial=1.0))
     bars = axes.barh(rows, np.minimum(sizes, longest), color=COMPLETED, height=0.6)
-    axes.bar_label(bars, [significant(float(size)) if np.isfinite(size) else "any" for size in sizes], padding=3)
+    axes.bar_label(
+        bars, [significant(float(size)) if np.isfinite(size) else "any" for size in sizes], padding=4, fontsize=9
+    )
     axes.margins(x=0.2)
+    axes.locator_params(axis="x", nbins=5)
 
 
 def _factor(gain: float) -> str:

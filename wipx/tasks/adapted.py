@@ -5,10 +5,12 @@ from fnmatch import fnmatch
 import numpy as np
 
 from wipx.core.errors import InputError
+from wipx.core.model import Model
 from wipx.identify.adaptation import AdaptationProblem, Adapted, LoadedTrials, adaptation
 from wipx.identify.method import Method
 from wipx.identify.objectives import PaperTrajectories
 from wipx.library import feedback_of
+from wipx.recordings.model_file import read_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.job import Job
@@ -44,7 +46,8 @@ def adaptation_problem(
         held_out: Names of loads that no search sees.
 
     Raises:
-        InputError: the objective is not the paper's, or see `wipx.identify.adaptation.adaptation`.
+        InputError: the objective is not the paper's, a model of model.path is missing or belongs to another plant, or
+            see `wipx.identify.adaptation.adaptation`.
     """
     objective = job.part("objective")
     if not isinstance(objective, PaperTrajectories):
@@ -52,7 +55,7 @@ def adaptation_problem(
             f"task={job.chosen.get('task')} matches trajectories as the paper does; choose objective=paper"
         )
     method: Method = job.part("method")
-    nominal = job.part("plant").nominal(source.describe().model)
+    nominal = _start(job, job.part("plant").nominal(source.describe().model), completed=method.completes)
     switched_on = method.switched_on(nominal, job.part("friction"), job.effects)
     return adaptation(nominal, switched_on, trials, held_out, job.part("sim"), objective, job.bounds)
 
@@ -67,6 +70,22 @@ def adapted_simulation(job: Job, problem: AdaptationProblem, draws: int) -> Adap
         return problem.random(draws, method.reach, rng)
     with SearchProgress("adapt") as progress:
         return problem.optimised(job.part("optimizer"), rng, progress)
+
+
+def _start(job: Job, nominal: Model, *, completed: bool) -> Model:
+    """What a method starts from: the nominal model, or one that was completed before."""
+    if completed != (job.model_path is not None):
+        remedy = "give model.path=FOLDER/model.yaml of task=diagnose" if completed else "choose method=diagnosed for it"
+        raise InputError(f"method={job.chosen.get('method')}: model.path is {job.model_path or 'not given'}; {remedy}")
+    if job.model_path is None:
+        return nominal
+    model = read_model(job.model_path)
+    if model.plant != nominal.plant:
+        raise InputError(
+            f"{job.model_path}: a model of plant {model.plant.kind}, expected {nominal.plant.kind} like the target; "
+            "give the model of this robot"
+        )
+    return model
 
 
 def _class_of(robot: RobotDescription, recording: str) -> str:

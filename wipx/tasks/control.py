@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from wipx.control.controller import Controller
 from wipx.control.equilibrium import EquilibriumLqr, EquilibriumRegulator
 from wipx.control.loop import Loop
 from wipx.control.predictive import Mpc
@@ -18,7 +19,6 @@ from wipx.hardware.testbed import EmulatedTestbed
 from wipx.learn.estimator import Recipe, Workshop
 from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
-from wipx.tasks.adapted import loaded_trials
 from wipx.tasks.control_files import plain_control, write_courses
 from wipx.tasks.control_metrics import Judge
 from wipx.tasks.control_scenarios import SCENARIOS, Scenario, ScenarioName
@@ -27,8 +27,8 @@ from wipx.tasks.finished import finish, finished
 from wipx.tasks.job import Job
 from wipx.tasks.progress import StageProgress
 from wipx.tasks.results import flat, written_together
-from wipx.tasks.trials import trials_of
 
+Design = Controller | EquilibriumLqr
 WITHIN = 0.95  # share of the rail in which a predictive controller, which knows where it ends, plans to stay
 
 
@@ -90,7 +90,7 @@ class Control:
             )
         with written_together(job.out) as folder:
             robots = training_set_of(self._recording(job), settings)
-            loop = self._loop(job, robots, settings, folder)
+            loop = self.loop(job, job.part("controller"), robots, folder)
             trials = self._trials(target, loop)
             result = self._result(job, robots, target, trials, estimates=isinstance(loop, EquilibriumRegulator))
             _write(job, folder, result)
@@ -126,17 +126,22 @@ class Control:
 
         return replace(job, part=part, settings={**job.settings, "controller": self.recorded_with})
 
-    def _loop(self, job: Job, robots: SimulatedRobots, settings: Dataset, folder: Path) -> Loop:
-        """The chosen controller on the adapted simulation; its estimator is trained now where it needs one."""
-        controller = job.part("controller")
+    def loop(self, job: Job, controller: Design, robots: SimulatedRobots, folder: Path) -> Loop:
+        """A controller on the adapted simulation; its estimator is trained now where it needs one.
+
+        Args:
+            job: Has estimator, simulator and seed.
+            controller: Of any kind.
+            robots: The simulation, and what is learned from.
+            folder: Takes what the estimator keeps.
+        """
         if isinstance(controller, Mpc):
             controller = replace(controller, rail=WITHIN * self._rail)
         if not isinstance(controller, EquilibriumLqr):
             return controller.loop(robots.model)
-        trials = loaded_trials(trials_of(self._recording(job), settings.plan()))
         recipe: Recipe = job.part("estimator")
         training = robots.training.first(self.length)
-        workshop = Workshop(training, robots.model, job.part("sim"), trials.feedback, job.seed, folder)
+        workshop = Workshop(training, robots.model, job.part("sim"), robots.feedback, job.seed, folder)
         with StageProgress("train") as progress:
             return controller.loop(robots.model, recipe.prepare(workshop, progress))
 
@@ -149,8 +154,9 @@ class Control:
         for i, name, k in tqdm(planned, desc=self.scenario, leave=False, disable=None):
             trial = scenario.trial(f"{name}_{k + 1}.csv", name)
             (recording,) = target.run([trial], loop, np.random.default_rng([self.trial_seed, i, k]))
-            estimate = loop.balance if isinstance(loop, EquilibriumRegulator) else None
-            judged.append(judge.judged(recording, name, k + 1, pitches[name], estimate))
+            estimate, notes = (loop.balance, loop.notes) if isinstance(loop, EquilibriumRegulator) else (None, ())
+            trial = judge.judged(recording, name, k + 1, pitches[name], estimate)
+            judged.append(replace(trial, notes=notes))
         return tuple(judged)
 
     def _result(

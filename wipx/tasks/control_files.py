@@ -43,7 +43,10 @@ def read_control(folder: Path) -> ControlResult:
         table = np.genfromtxt(folder / COURSES, delimiter=",", names=True, deletechars="", replace_space=" ")
         loads = {name: Load(**place) for name, place in plain.pop("loads").items()}
         trials = tuple(
-            ControlTrial(course=_course(table, f"{trial['load']}_{trial['number']}"), **trial)
+            ControlTrial(
+                **{**trial, "notes": tuple(trial["notes"])},
+                course=_course(table, f"{trial['load']}_{trial['number']}"),
+            )
             for trial in plain.pop("trials")
         )
         return ControlResult(loads=loads, trials=trials, **plain)

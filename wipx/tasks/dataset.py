@@ -17,8 +17,9 @@ from wipx.learn.dataset import ObservationNoise, Watch, check_labels, generate
 from wipx.learn.dataset_file import read_training_set, write_training_set
 from wipx.learn.loads import LoadRanges
 from wipx.learn.training_set import PARTS, TrainingSet
-from wipx.recordings.model_file import model_from_mapping
+from wipx.recordings.model_file import model_from_mapping, read_model
 from wipx.report.numbers import significant
+from wipx.sim.simulator import StateFeedback
 from wipx.tasks.adapted import adaptation_problem, adapted_simulation, loaded_trials
 from wipx.tasks.finished import finish, finished
 from wipx.tasks.job import Job
@@ -96,7 +97,7 @@ class Dataset:
             print(f"{job.out}: finished before, nothing to do")
             return
         started = time.perf_counter()
-        training, _ = training_set_of(job, self)
+        training = training_set_of(job, self).training
         seconds = time.perf_counter() - started
         path = FOLDER / f"{training.card['name']}.parquet"
         with written_together(job.out) as folder:
@@ -113,10 +114,12 @@ class SimulatedRobots(NamedTuple):
         training: The training set.
         model: The simulation that it comes from, without load; of a method with random numbers the draw
             whose loss is the median.
+        feedback: The controller that closes their loop, and its rate [Hz].
     """
 
     training: TrainingSet
     model: Model
+    feedback: tuple[StateFeedback, float]
 
 
 def training_set_of(job: Job, settings: Dataset) -> SimulatedRobots:
@@ -137,7 +140,7 @@ def training_set_of(job: Job, settings: Dataset) -> SimulatedRobots:
             problem = adaptation_problem(job, source, trials, settings.held_out)
             write_training_set(_made(job, settings, problem, name), path)
     training = read_training_set(path)
-    return SimulatedRobots(training, _typical(training, path))
+    return SimulatedRobots(training, _typical(training, path), trials.feedback)
 
 
 def _made(job: Job, settings: Dataset, problem: AdaptationProblem, name: str) -> TrainingSet:
@@ -181,6 +184,7 @@ def _digest(job: Job, settings: Dataset, trials: LoadedTrials) -> str:
     """Short name of everything that decides a training set."""
     feedback, rate = trials.feedback
     deciding = {key: job.settings[key] for key in DECIDING}
+    deciding["model"] = None if job.model_path is None else _plain(read_model(job.model_path))
     deciding |= {"seed": job.seed, "dataset": asdict(settings), "loop": [feedback.gains.tolist(), rate]}
     digest = hashlib.sha256(json.dumps(deciding, sort_keys=True).encode())
     for recording, load in zip(trials.recordings, trials.loads, strict=True):

@@ -10,6 +10,7 @@ from wipx.tasks.job import Job
 from wipx.tasks.results import flat, write_json
 
 RESULT = "result.json"
+SETTINGS = "config.yaml"  # stands beside the results of every task that has succeeded
 ERROR = "error.txt"
 WITHOUT_EFFECT = ("name", "label", "tracking")  # settings that change no result
 

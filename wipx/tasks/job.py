@@ -24,6 +24,7 @@ class Job:
         settings: The whole configuration in plain containers, for logging.
         chosen: Option that was chosen of each group, by group; empty where a run was put together otherwise.
         sweep: Folder of the sweep that the run is a job of; None for a single run.
+        overrides: What the command line asked for, each as KEY=VALUE.
     """
 
     out: Path
@@ -37,3 +38,4 @@ class Job:
     settings: Mapping[str, Any]
     chosen: Mapping[str, str] = field(default_factory=dict)
     sweep: Path | None = None
+    overrides: tuple[str, ...] = ()

@@ -1,82 +1,189 @@
-"""`task=pipeline`: the whole chain on a robot: record, identify, judge on fresh recordings."""
+"""`task=pipeline`: the whole chain on a robot: record, diagnose and complete, learn, balance and track a load.
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+Recording is done here. All that follows are stages: commands of this program, which stand in their folders.
+"""
+
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import yaml
+from tqdm import tqdm
 
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.hardware.excitations import KINDS, excitation
 from wipx.hardware.target import Target, Trial
-from wipx.hardware.testbed import EmulatedTestbed
-from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.identify import Identify
+from wipx.tasks.control_scenarios import ScenarioName
 from wipx.tasks.job import Job
+from wipx.tasks.progress import StageProgress
 from wipx.tasks.results import write_csv, written_together
-from wipx.tasks.trials import recording_controller, write_robot
+from wipx.tasks.stages import Chain, Stage
+from wipx.tasks.story import leave_story
+from wipx.tasks.trials import write_robot
 
-FITTED = tuple(f"r{i}.csv" for i in range(1, 7))
-FRESH = tuple(f"fresh{i}.csv" for i in range(1, 4))
 RELEASED_AT, LEANING = (0.03, 0.06), 0.01  # [rad] pitch at the start of a release, and of the other runs
+OURS = "lqr_equilibrium"  # controller under a load, unless another one is asked for
+EVERYWHERE = ("name", "plant", "seed", "sim", "tracking")  # what every stage may be told
+FORWARDED = (*EVERYWHERE, "controller", "estimator", "target")  # what some stage may be told
 
 
 @dataclass(frozen=True)
 class Pipeline:
-    """Record the target without load, complete its model, judge the model on recordings that it never saw.
+    """Take a robot that differs from its simulation to one that balances a load that it does not know.
 
     Attributes:
-        effects: Switched on beside the friction where the run names none.
-        horizon: Length of the predictions by which models are judged [s].
-        lead: Time before a prediction from which its state is estimated [s].
-        duration: Of each recording [s].
+        recorded_with: Controller of the robot without load; with a load it is the baseline.
+        fitted: Recordings of the robot without load.
+        fresh: Further ones, which no fit sees.
+        duration: Of each [s].
         log_every: Ticks of the loop per row of the log; a row has the mean of their commands.
+        samples: Simulated robots that the estimator learns from.
+        length: Samples of the estimator's window.
+        loads: Names of the target's loads that the robot has to balance.
+        per_load: Trials with each.
+        scenarios: What is done with them.
     """
 
-    effects: tuple[str, ...] = ("actuator/delay", "actuator/dead_zone", "sensor_theta/bias")
-    horizon: float = 0.5
-    lead: float = 0.3
-    duration: float = 10.0
-    log_every: int = 2
+    recorded_with: dict[str, Any] = field(default_factory=dict)
+    fitted: int = 5
+    fresh: int = 2
+    duration: float = 8.0
+    log_every: int = 6
+    samples: int = 800
+    length: int = 30
+    loads: tuple[str, ...] = ("a2", "b5")
+    per_load: int = 2
+    scenarios: tuple[ScenarioName, ...] = ("balancing", "tracking")
 
     def __post_init__(self) -> None:
-        check_positive(duration=self.duration, log_every=self.log_every)
+        check_positive(
+            fitted=self.fitted,
+            fresh=self.fresh,
+            duration=self.duration,
+            log_every=self.log_every,
+            samples=self.samples,
+            per_load=self.per_load,
+        )
+        for name, values in {"loads": self.loads, "scenarios": self.scenarios}.items():
+            if not values:
+                raise InputError(f"task.{name} is empty; name at least one")
 
     def run(self, job: Job) -> None:
-        """Record, identify, judge, write."""
-        target: Target | RecordingSource = job.part("target")
-        if isinstance(target, RecordingSource):
-            raise InputError(
-                "task=pipeline runs a robot; use task=diagnose or task=identify recordings.path=... for recordings"
-            )
+        """Record, run all stages, tell the story."""
+        target = _target(job)
+        forwarded = _forwarded(job)
+        self._record(job, target)
+        with StageProgress("pipeline") as progress:
+            chain = Chain(job.out, progress)
+            chain.run(self._diagnosis(job, forwarded))
+            chain.run(*(self._training(job, forwarded, name) for name in ("nominal", "estimator")))
+            chain.run(*self._driving(job, forwarded))
+        print(leave_story(job.out, target, self.scenarios))
+
+    def _record(self, job: Job, target: Target) -> None:
+        """Recordings of the robot without load, in the contract's format; made once."""
+        names = [*(f"r{i + 1}.csv" for i in range(self.fitted)), *self._fresh]
+        if (job.out / "recordings").is_dir():
+            return
         nominal: Model = job.part("plant").nominal(target.nominal())
-        controller = recording_controller(job)
+        controller = job.build(self.recorded_with, "task.recorded_with")
         rng = np.random.default_rng(job.seed)
-        trials = [self._trial(k, name, nominal, rng) for k, name in enumerate((*FITTED, *FRESH))]
-        print(f"recording {len(trials)} runs of a {nominal.plant.kind} ({type(target).__name__}) ...")
+        trials = [self._trial(k, name, nominal, rng) for k, name in enumerate(names)]
         with written_together(job.out) as folder:
             (folder / "recordings").mkdir()
             write_robot(folder / "recordings" / "robot.yaml", nominal, controller, {})
-            for recording in target.run(trials, controller.loop(nominal), rng):
+            runs = target.run(trials, controller.loop(nominal), rng)
+            for recording in tqdm(runs, desc="record", total=len(trials), leave=False, disable=None):
                 slow = logged_slower(recording, self.log_every)
                 write_csv(folder / "recordings" / slow.name, dict(slow.columns))
-            if isinstance(target, EmulatedTestbed):
-                hidden = target.hidden()
-                write_model(hidden.model, folder / "hidden.yaml")
-                _write_yaml(folder / "hidden_signals.yaml", hidden.beside_the_model())
-        source = RecordingSource(path=str(job.out / "recordings"), title=type(target).__name__, held_out=list(FRESH))
-        effects = job.effects or self.effects
-        Identify(self.horizon, self.lead).complete(replace(job, effects=effects), source)
-        if isinstance(target, EmulatedTestbed):
-            print(f"what the testbed really had: {job.out / 'hidden.yaml'}, {job.out / 'hidden_signals.yaml'}")
 
     def _trial(self, number: int, name: str, nominal: Model, rng: np.random.Generator) -> Trial:
         pitch = rng.uniform(*RELEASED_AT) if number % KINDS == 0 else rng.uniform(-LEANING, LEANING)
         return Trial(name, self.duration, pitch=pitch, reference=excitation(number, nominal.plant, rng))
+
+    @property
+    def _fresh(self) -> list[str]:
+        """Names of the recordings that no fit sees."""
+        return [f"fresh{i + 1}.csv" for i in range(self.fresh)]
+
+    def _diagnosis(self, job: Job, forwarded: tuple[str, ...]) -> Stage:
+        """What the nominal model lacks, from the recordings alone."""
+        own = (
+            "task=diagnose",
+            f"recordings.path='{job.out}/recordings'",
+            f"recordings.held_out=[{','.join(self._fresh)}]",
+        )
+        return Stage("diagnosis", (*own, *_of_groups(forwarded, *EVERYWHERE)), 0.4)
+
+    def _training(self, job: Job, forwarded: tuple[str, ...], name: str) -> Stage:
+        """An estimator of the pitch at which a loaded robot balances, trained in simulation."""
+        own = ("task=train", f"task.length={self.length}", *self._simulation(job, name))
+        return Stage(name, (*own, *_of_groups(forwarded, *EVERYWHERE, "target", "estimator")), 0.15)
+
+    def _simulation(self, job: Job, name: str) -> tuple[str, ...]:
+        """The nominal simulation, or the completed one, and the robots that are simulated in it."""
+        completed = ("method=diagnosed", f"model.path='{job.out}/diagnosis/model.yaml'")
+        return (
+            *(("method=pure_sim",) if name == "nominal" else completed),
+            "objective=paper",
+            "objective.at_rest=true",
+            f"task.dataset.samples={self.samples}",
+            "task.dataset.per_load=2",
+        )
+
+    def _driving(self, job: Job, forwarded: tuple[str, ...]) -> list[Stage]:
+        """The robot under loads that nobody knows: baseline and ours in every scenario."""
+        network = job.out / "estimator" / "estimator.onnx"
+        trained = ("estimator=trained", f"estimator.path='{network}'")
+        everywhere = _of_groups(forwarded, *EVERYWHERE, "target")
+        ours = (
+            *(_of_groups(forwarded, "controller") or (f"controller={OURS}",)),
+            *(trained if network.is_file() else _of_groups(forwarded, "estimator")),
+        )
+        simulation = self._simulation(job, "estimator")
+        loads = (f"task.loads=[{','.join(self.loads)}]", f"task.per_load={self.per_load}", f"task.length={self.length}")
+        stages = []
+        for scenario in self.scenarios:
+            own = ("task=control", f"task.scenario={scenario}", *loads, *simulation, *everywhere)
+            share = 0.3 / (2 * len(self.scenarios))
+            stages.append(Stage(f"{scenario}-baseline", (*own, "controller=lqr"), share))
+            stages.append(Stage(f"{scenario}-ours", (*own, *ours), share))
+        return stages
+
+
+def _target(job: Job) -> Target:
+    """The robot, if it can be driven."""
+    target: Target | RecordingSource = job.part("target")
+    if isinstance(target, RecordingSource):
+        raise InputError("task=pipeline drives a robot; use task=diagnose recordings.path=... for recordings")
+    return target
+
+
+def _forwarded(job: Job) -> tuple[str, ...]:
+    """What the command line asked for that the stages are asked for too.
+
+    Raises:
+        InputError: it asked for something else than the chain can do.
+    """
+    kept = []
+    for override in job.overrides:
+        group = _group_of(override)
+        if group != "task" and group not in FORWARDED:
+            raise InputError(f"{override}: task=pipeline has no use for it; it takes task and {', '.join(FORWARDED)}")
+        if group != "task":
+            kept.append(override)
+    return tuple(kept)
+
+
+def _of_groups(overrides: tuple[str, ...], *groups: str) -> tuple[str, ...]:
+    return tuple(override for override in overrides if _group_of(override) in groups)
+
+
+def _group_of(override: str) -> str:
+    """Group of an override such as `+controller.rate=500`."""
+    return override.lstrip("+~").partition("=")[0].partition(".")[0]
 
 
 def logged_slower(recording: Recording, every: int) -> Recording:
@@ -92,7 +199,3 @@ def logged_slower(recording: Recording, every: int) -> Recording:
         else:
             columns[name] = values[:rows:every]
     return Recording(recording.name, columns, recording.source, recording.periods * every)
-
-
-def _write_yaml(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
