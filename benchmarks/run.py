@@ -1,4 +1,4 @@
-"""Speed and memory of the simulator, the identification and the estimators, beside physics engines.
+"""Speed and memory of simulator, identification, diagnosis, estimators and controllers, beside physics engines.
 
 Times are processor times, which other work on the machine disturbs little; compare the ratios
 of one run. The figures are also written to runs/bench/bench.json.
@@ -9,6 +9,8 @@ import os
 import platform
 from pathlib import Path
 
+from controllers import measure_controllers
+from diagnosis import measure_diagnosis
 from engines import measure_engines
 from estimators import measure_estimators
 from identification import measure_identification
@@ -27,7 +29,9 @@ def main() -> None:
         "engines": measure_engines(),
         "compilation": measure_compilation(),
         "identification": measure_identification(),
+        "diagnosis": measure_diagnosis(),
         "estimators": measure_estimators(),
+        "controllers": measure_controllers(),
     }
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
     RESULTS.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

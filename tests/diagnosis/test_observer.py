@@ -13,8 +13,18 @@ from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.fitting import Fitter
 from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.log import Log
-from wipx.diagnosis.observer import NoiseLevels, linearise_along, observer_gains
+from wipx.diagnosis.log import SETTLES, Log
+from wipx.diagnosis.observer import (
+    DIFFUSE,
+    UNHEARD,
+    UNSETTLED,
+    Gains,
+    Linearisation,
+    NoiseLevels,
+    linearise_along,
+    observer_gains,
+    transition_over,
+)
 from wipx.sim.analytic import Observer
 from wipx.sim.inputs import Inputs
 
@@ -76,7 +86,7 @@ def test_gains_settle_at_the_solution_of_the_riccati_equation(kind: str):
     log = Log.of((Recording("still.csv", {"t": t, **still}),), model.plant)
     levels = NoiseLevels(np.array([0.05, 0.02])[:joints], np.array([1e-4, 3e-4])[:joints])
     linear = linearise_along(model, log)
-    gains = observer_gains(linear, log, levels)
+    (gains,) = observer_gains(linear, log, (levels,))
     a = np.block([[np.zeros((joints, joints)), np.eye(joints)], [linear.a[0]]])
     drive = np.zeros((2 * joints, 2 * joints))
     drive[joints:, joints:] = linear.b[0] @ np.diag(levels.force**2) @ linear.b[0].T
@@ -85,7 +95,7 @@ def test_gains_settle_at_the_solution_of_the_riccati_equation(kind: str):
     sensor = np.diag(levels.sensor**2)
     p = solve_discrete_are(transition.T, h.T, noise, sensor)
     s = h @ p @ h.T + sensor
-    # To third order in the interval, and variances are taken for constant once they change by 1e-5 a row.
+    # To third order in the interval.
     np.testing.assert_allclose(gains.gains[-1, 0, :, :joints], p @ h.T @ np.linalg.inv(s), rtol=0.01, atol=1e-4)
     factor = gains.whitening[-1, 0]
     np.testing.assert_allclose(factor @ s @ factor.T, np.eye(joints), atol=0.01)
@@ -100,6 +110,69 @@ def discretised(a: np.ndarray, drive: np.ndarray, steps: int = 400) -> tuple[np.
         covariance = small @ (covariance + 0.5 * h * drive) @ small.T + 0.5 * h * drive
         transition = small @ transition
     return transition, covariance
+
+
+def uneven_log(kind: str, rng: np.random.Generator) -> Log:
+    """Recordings of different lengths with jitter and gaps, of which only times and places matter."""
+    plant = nominal_model(kind).plant
+    names = (*plant.coordinates, *plant.rates[-1:], *plant.commands)
+    recordings = []
+    for rows in (90, 140):
+        t = np.cumsum(rng.choice((DT, 1.2 * DT, 5.0 * DT), rows, p=(0.6, 0.3, 0.1)))
+        columns = {name: rng.normal(size=rows).cumsum() * 0.03 for name in names}
+        recordings.append(Recording(f"r{rows}.csv", {"t": t, **columns}))
+    return Log.of(tuple(recordings), plant)
+
+
+@pytest.mark.parametrize("kind", ["linear_axis", "wip", "double_pendulum"])
+@pytest.mark.parametrize("late", [0.0, 0.02])
+def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late: float, fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    log = uneven_log(kind, rng)
+    linear = linearise_along(nominal_model(kind), log)
+    delays = (late,) * log.joints
+    sizes = np.exp(rng.uniform(-8.0, -2.0, (3, log.joints + len(log.channels))))
+    levels = [NoiseLevels(size[: log.joints], size[log.joints :]) for size in sizes]
+    for level, found in zip(levels, observer_gains(linear, log, levels, delays), strict=True):
+        for r in range(2):
+            plain = plain_filter(linear, log, level, np.array(delays), r)
+            last = int(log.inputs.last[r]) + 1
+            # A first state known 1e4 times worse than the sensors costs half of the digits.
+            scale = np.abs(plain.gains).max()
+            np.testing.assert_allclose(found.gains[:last, r], plain.gains, atol=1e-5 * scale)
+            np.testing.assert_allclose(
+                found.whitening[:last, r] / plain.whitening.max(), plain.whitening / plain.whitening.max(), atol=1e-5
+            )
+            assert not found.gains[last:, r].any()
+
+
+def plain_filter(linear: Linearisation, log: Log, levels: NoiseLevels, late: np.ndarray, r: int) -> Gains:
+    """The recursion in matrices, one row of one recording at a time."""
+    joints, t = log.joints, log.inputs.t[:, r] - log.inputs.t[0, r]
+    h = np.eye(2 * joints)[log.channels]
+    for c, channel in enumerate(log.channels):
+        if channel < joints:
+            h[c, channel + joints] = -late[channel]
+    variance = levels.sensor**2
+    first = 9.0 * np.diag(np.concatenate([variance[:joints], variance[:joints] / 0.02**2]))
+    p, transition, gains, whitening = DIFFUSE * first, np.zeros_like(first), [], []
+    for k in range(int(log.inputs.last[r]) + 1):
+        if k > 0 and t[k - 1] <= SETTLES < t[k]:
+            p = first
+        heard = [v if c >= joints or t[k] >= late[c] else UNHEARD for v, c in zip(variance, log.channels, strict=True)]
+        s = h @ p @ h.T + np.diag(heard)
+        gain = p @ h.T @ np.linalg.inv(s)
+        gains.append(np.zeros_like(first))
+        gains[-1][:, log.channels] = gain
+        whitening.append(np.linalg.inv(np.linalg.cholesky(s)))
+        dt = float(log.intervals[k, r]) if k < log.inputs.last[r] else 0.0
+        place = linear.place[k, r]
+        transition_over(linear.a[place], dt, transition)
+        drive = linear.b[place] @ np.diag(levels.force**2) @ linear.b[place].T
+        drive = drive if t[k] > SETTLES else UNSETTLED * drive
+        held = np.block([[dt**3 / 3.0 * drive, dt**2 / 2.0 * drive], [dt**2 / 2.0 * drive, dt * drive]])
+        p = transition @ (p - gain @ s @ gain.T) @ transition.T + held
+    return Gains(np.array(gains), np.array(whitening))
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "double_pendulum"])

@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
 from wipx.diagnosis.log import Log
-from wipx.diagnosis.whiteness import LAGS, colour_of, whitened
+from wipx.diagnosis.whiteness import LAGS, SURPRISES, colour_of, lagged_products, whitened
 
 ROWS = 6000
 AR2 = (1.2, -0.5)  # z[k] = 1.2 z[k-1] - 0.5 z[k-2] + e[k]
@@ -84,3 +84,44 @@ def test_a_model_that_ran_away_is_the_least_likely():
     lost = np.full((1, 1, ROWS), 1e3)
     noise = np.random.default_rng(0).normal(size=(1, 1, ROWS))
     assert colour_of(lost, log).log_likelihood < colour_of(100.0 * noise, log).log_likelihood
+
+
+def design(innovations: np.ndarray, counted: np.ndarray, surprises: np.ndarray) -> np.ndarray:
+    """Present, past and surprises at every row that counts, one column each."""
+    blocks = []
+    for r in range(len(innovations)):
+        seen = np.where(counted[:, r], innovations[r], 0.0)
+        columns = [np.roll(series, lag) * (np.arange(len(series)) >= lag) for lag in [0, *LAGS] for series in seen]
+        columns += [np.roll(series, 1 + i) for i in range(SURPRISES) for series in surprises[r]]
+        blocks.append(np.array(columns).T[counted[:, r]])
+    return np.concatenate(blocks)
+
+
+def ragged(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Innovations (3, 4, 200), rows that count (200, 3), few in the last recording, and surprises (3, 2, 200)."""
+    counted = np.zeros((200, 3), dtype=bool)
+    counted[15:200, 0] = counted[12:150, 1] = counted[20:40, 2] = True
+    return rng.normal(size=(3, 4, 200)), counted, rng.normal(size=(3, 2, 200))
+
+
+def test_products_are_those_of_the_matrix_of_lagged_rows(fresh_seed: int):
+    innovations, counted, surprises = ragged(np.random.default_rng(fresh_seed))
+    for begin, end, known in ((0, 4, surprises), (0, 3, surprises[:, :0]), (3, 4, surprises[:, :0])):
+        matrix = design(innovations[:, begin:end], counted, known)
+        found = lagged_products(innovations, begin, end, counted, known)
+        np.testing.assert_allclose(found, matrix.T @ matrix, atol=1e-10)
+
+
+def test_a_colour_is_the_least_squares_fit_and_leaves_white_what_it_does_not_foretell(fresh_seed: int):
+    log = empty_log(2)
+    series, _ = autoregression(np.random.default_rng(fresh_seed), 2)
+    colour = colour_of(series, log)
+    matrix = design(series, log.counted, log.surprises)
+    now, past = matrix[:, :1], matrix[:, 1:]
+    weights = np.linalg.lstsq(past, now, rcond=None)[0]
+    left = (now - past @ weights)[:, 0]
+    np.testing.assert_allclose(colour.weights, weights, atol=1e-6)
+    # The ridge of a billionth, times half the 12000 rows.
+    assert colour.log_likelihood == pytest.approx(-0.5 * len(left) * np.log(np.mean(left**2)), abs=1e-4)
+    white = whitened(series[None], colour, log)[0, :, 0][log.counted.T]
+    np.testing.assert_allclose(white, left / np.sqrt(np.mean(left**2)), atol=1e-5)

@@ -4,7 +4,8 @@ Prediction-error method (Ljung 1999, System Identification, ch. 7): Levenberg-Ma
 innovations with observer and colour held fixed, in turn with a search over the noise levels.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -79,21 +80,17 @@ class Fitter:
             levels: Noise.
             steps: Levenberg-Marquardt steps at most.
         """
-        here = self._evaluate(hypothesis, levels)
+        here = self._started(hypothesis, levels)
         if not len(hypothesis.cube):
             return here
-        size = np.full(len(hypothesis.cube), FIRST_STEP)
         for _ in range(steps):
-            jacobian = self._slopes(here, size)
-            size = np.clip(SECANT / np.sqrt(np.maximum(np.sum(jacobian**2, axis=0), 1e-12)), 1e-6, LARGEST_STEP)
-            here = replace(here, jacobian=jacobian)
+            deviations = 1.0 / np.sqrt(np.maximum(np.sum(here.jacobian**2, axis=0), 1e-12))
             there = self._best_of(here, self._proposals(here))
             gain = there.log_likelihood - here.log_likelihood
-            if gain > 0.0:
-                here = there
+            here = self._resloped(there if gain > 0.0 else here, np.clip(SECANT * deviations, 1e-6, LARGEST_STEP))
             if gain < SETTLED:
                 break
-        return replace(here, jacobian=self._slopes(here, size))
+        return here
 
     def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
@@ -109,13 +106,15 @@ class Fitter:
 
         The levels' common factor does not matter: the first sensor's level is kept. Where the log has means of
         commands and the model a threshold for them, the spread of the single commands is searched too.
+
+        Args:
+            fit: Where to start.
         """
         fixed = len(fit.levels.force)
         levels = self._with_spread(fit)
-        best = _logarithms(levels)
+        search = _LevelSearch(self, fit.hypothesis, levels)
+        centre = best = _logarithms(levels)
         free = [i for i in range(len(best) - (levels.spread == 0.0)) if i != fixed]
-        centre = best.copy()
-        likelihood = self._likelihoods(fit.hypothesis, [levels])[0]
         for step in LEVEL_STEPS:
             move = np.zeros_like(best)
             for _ in range(12):
@@ -123,11 +122,12 @@ class Fitter:
                 if np.count_nonzero(move) > 1:
                     trials.append(best + move)
                 trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
-                found = np.array(self._likelihoods(fit.hypothesis, [_levels(trial, levels) for trial in trials]))
-                move = _joined(found[: 2 * len(free)] - likelihood, step, free, len(best))
-                if found.max() <= likelihood + LEVEL_GAIN:
+                likelihoods = search.likelihoods([best, *trials])
+                gains = likelihoods[1:] - likelihoods[0]
+                move = _joined(gains[: 2 * len(free)], step, free, len(best))
+                if gains.max() <= LEVEL_GAIN:
                     break
-                best, likelihood = trials[int(found.argmax())], float(found.max())
+                best = trials[int(gains.argmax())]
         return _levels(best, levels)
 
     def _with_spread(self, fit: Fit) -> NoiseLevels:
@@ -135,9 +135,10 @@ class Fitter:
         log = self.follower.log
         kinds = {name.partition("/")[2] for name in fit.hypothesis.model.effects}
         averaged = any(recording.periods > 1 for recording in log.recordings)
-        if not averaged or kinds.isdisjoint(THRESHOLDS):
-            return replace(fit.levels, spread=0.0)
-        return fit.levels if fit.levels.spread > 0.0 else replace(fit.levels, spread=log.command_noise)
+        matters = averaged and not kinds.isdisjoint(THRESHOLDS)
+        if matters == (fit.levels.spread > 0.0):
+            return fit.levels
+        return replace(fit.levels, spread=log.command_noise if matters else 0.0)
 
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
         """White innovations of other models, with observer and colour of a fit, shape (P, R m (K + 1))."""
@@ -145,19 +146,42 @@ class Fitter:
         innovations = self._followed(batch, gains, fit.levels)
         return whitened(innovations, fit.colour, self.follower.log).reshape(batch.size, -1)
 
-    def _evaluate(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
-        gains = self.follower.gains(levels, hypothesis.model)
-        innovations = self._innovations(hypothesis, hypothesis.cube[None], levels)
-        return self._measured(hypothesis, levels, innovations[0], _log_determinant(gains.whitening, self.follower.log))
+    def _started(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
+        """The values of a hypothesis as they are, with first slopes."""
+        cubes = _around(hypothesis.cube, np.full(len(hypothesis.cube), FIRST_STEP))
+        innovations = self._innovations(hypothesis, cubes, levels)
+        return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], innovations[:1]), cubes, innovations)
 
-    def _measured(self, hypothesis: Hypothesis, levels: NoiseLevels, innovations: np.ndarray, scale: float) -> Fit:
+    def _resloped(self, fit: Fit, size: np.ndarray) -> Fit:
+        """A fit with slopes over steps of the position in the cube, shape (D,)."""
+        cubes = _around(fit.hypothesis.cube, size)
+        return self._with_slopes(fit, cubes, self._innovations(fit.hypothesis, cubes, fit.levels))
+
+    def _with_slopes(self, fit: Fit, cubes: np.ndarray, innovations: np.ndarray) -> Fit:
+        """A fit with slopes of white innovations and priors, from the positions around it and their innovations."""
+        white = whitened(innovations, fit.colour, self.follower.log).reshape(len(cubes), -1)
+        rows = np.concatenate([white, fit.hypothesis.space.prior_residuals(cubes)], axis=1)
+        return replace(fit, jacobian=((rows[1:] - rows[0]) / np.diag(cubes[1:] - cubes[0])[:, None]).T)
+
+    def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:
+        """The likeliest of several positions in the cube, without slopes."""
+        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
+        return self._likeliest(fit.hypothesis, fit.levels, cubes, innovations)
+
+    def _likeliest(
+        self, hypothesis: Hypothesis, levels: NoiseLevels, cubes: np.ndarray, innovations: np.ndarray
+    ) -> Fit:
+        """The likeliest of several positions in the cube by their innovations (P, R, m, K + 1), without slopes."""
         log = self.follower.log
-        colour = colour_of(innovations, log)
-        white = whitened(innovations[None], colour, log)[0]
-        priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
-        likelihood = scale + colour.log_likelihood - 0.5 * float(priors @ priors)
-        slopes = np.zeros((white.size + len(priors), len(hypothesis.cube)))
-        return Fit(hypothesis, levels, colour, white, int(log.counted.sum()), slopes, likelihood)
+        colours = [colour_of(each, log) for each in innovations]
+        priors = hypothesis.space.prior_residuals(cubes)
+        scale = _log_determinant(self.follower.gains(levels, hypothesis.model).whitening, log)
+        likelihoods = [scale + c.log_likelihood - 0.5 * float(p @ p) for c, p in zip(colours, priors, strict=True)]
+        i = int(np.argmax(likelihoods))
+        white = whitened(innovations[i : i + 1], colours[i], log)[0]
+        slopes = np.zeros((white.size + priors.shape[1], cubes.shape[1]))
+        best = hypothesis.at(cubes[i])
+        return Fit(best, levels, colours[i], white, int(log.counted.sum()), slopes, likelihoods[i])
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
         gains = self.follower.gains(levels, hypothesis.model)
@@ -166,16 +190,6 @@ class Fitter:
     def _followed(self, batch: ModelBatch, gains: Gains, levels: NoiseLevels) -> np.ndarray:
         same = np.zeros(batch.size, dtype=np.int64)
         return self.follower.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
-
-    def _slopes(self, fit: Fit, size: np.ndarray) -> np.ndarray:
-        """Slopes of white innovations and priors, by differences away from the nearer bound."""
-        cube, space = fit.hypothesis.cube, fit.hypothesis.space
-        signed = np.where(cube > 0.5, -size, size)
-        cubes = np.concatenate([cube[None], cube + np.diag(signed)])
-        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
-        white = whitened(innovations, fit.colour, self.follower.log).reshape(len(cubes), -1)
-        rows = np.concatenate([white, space.prior_residuals(cubes)], axis=1)
-        return ((rows[1:] - rows[0]) / signed[:, None]).T
 
     def _proposals(self, fit: Fit) -> np.ndarray:
         """Positions to try next, one for each damping, within the cube."""
@@ -195,20 +209,10 @@ class Fitter:
             proposals[i, free] -= step
         return np.clip(proposals, 0.0, 1.0)
 
-    def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:
-        gains = self.follower.gains(fit.levels, fit.hypothesis.model)
-        scale = _log_determinant(gains.whitening, self.follower.log)
-        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
-        fits = [
-            self._measured(fit.hypothesis.at(cube), fit.levels, each, scale)
-            for cube, each in zip(cubes, innovations, strict=True)
-        ]
-        return max(fits, key=lambda found: found.log_likelihood)
-
-    def _likelihoods(self, hypothesis: Hypothesis, levels: list[NoiseLevels]) -> list[float]:
+    def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[float]:
         """Log-likelihoods of one model with several noise levels."""
         log = self.follower.log
-        gains = tuple(self.follower.gains(level, hypothesis.model) for level in levels)
+        gains = self.follower.gains_of(levels, hypothesis.model)
         count = len(levels)
         batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
         spread = np.array([level.spread for level in levels])
@@ -218,6 +222,34 @@ class Fitter:
             _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
             for g, each in zip(gains, innovations, strict=True)
         ]
+
+
+@dataclass(frozen=True)
+class _LevelSearch:
+    """Likelihoods of one model by the logarithms of noise levels, each asked for once."""
+
+    fitter: Fitter
+    hypothesis: Hypothesis
+    levels: NoiseLevels
+    known: dict[tuple[float, ...], float] = field(default_factory=dict)
+
+    def likelihoods(self, points: Sequence[np.ndarray]) -> np.ndarray:
+        """Log-likelihoods of points; those that are not known yet are simulated at once."""
+        fresh = {_key(point): point for point in points if _key(point) not in self.known}
+        if fresh:
+            levels = [_levels(point, self.levels) for point in fresh.values()]
+            self.known.update(zip(fresh, self.fitter.likelihoods(self.hypothesis, levels), strict=True))
+        return np.array([self.known[_key(point)] for point in points])
+
+
+def _key(point: np.ndarray) -> tuple[float, ...]:
+    """Logarithms of levels, free of rounding."""
+    return tuple(np.round(point, 6).tolist())
+
+
+def _around(cube: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """A position in the cube, and a step from it along each axis away from the nearer bound, shape (D + 1, D)."""
+    return np.concatenate([cube[None], cube + np.diag(np.where(cube > 0.5, -size, size))])
 
 
 def _logarithms(levels: NoiseLevels) -> np.ndarray:
@@ -243,4 +275,4 @@ def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.n
 def _log_determinant(whitening: np.ndarray, log) -> float:
     """Sum of log det of the whitening over the rows that count."""
     diagonal = np.einsum("krcc->krc", whitening)[log.counted]
-    return float(np.log(diagonal).sum())
+    return float(np.log(diagonal.prod(axis=1)).sum())

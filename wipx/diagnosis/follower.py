@@ -1,5 +1,6 @@
 """Innovations: recorded minus what a model, kept close by the observer, shows one row ahead."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,6 +18,8 @@ from wipx.sim.simulator import Rollouts
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
 TAPS = 3  # rows of the modelled force that a report may be made of
 DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
+TOGETHER = 16  # rows of all models that are turned into innovations before the next
+MOST_KNOWN = 20  # gains that are kept; each holds as much as some ten recordings
 
 
 @dataclass(frozen=True)
@@ -41,15 +44,21 @@ class Follower:
 
     def gains(self, levels: NoiseLevels, model: Model) -> Gains:
         """Gains for noise levels and for the sensor delays of a model."""
-        columns = model.plant.coordinates
-        taus = [model.effects.get(f"sensor_{column}/delay", {}).get("tau", 0.0) for column in columns]
+        return self.gains_of((levels,), model)[0]
+
+    def gains_of(self, levels: Sequence[NoiseLevels], model: Model) -> tuple[Gains, ...]:
+        """Gains for each of several noise levels, all that are not known yet at once."""
+        taus = [model.effects.get(f"sensor_{name}/delay", {}).get("tau", 0.0) for name in model.plant.coordinates]
         delays = tuple(round(tau / DELAY_GRID) * DELAY_GRID for tau in taus)
-        key = (np.concatenate([levels.force, levels.sensor]).tobytes(), delays)
-        if key not in self._known:
-            if len(self._known) > 20:
+        keys = [(np.concatenate([level.force, level.sensor]).tobytes(), delays) for level in levels]
+        missing = {key: level for key, level in zip(keys, levels, strict=True) if key not in self._known}
+        if missing:
+            if len(self._known) > MOST_KNOWN:
                 self._known.clear()
-            self._known[key] = observer_gains(self.linear, self.log, levels, delays)
-        return self._known[key]
+                return self.gains_of(levels, model)
+            found = observer_gains(self.linear, self.log, list(missing.values()), delays)
+            self._known.update(zip(missing, found, strict=True))
+        return tuple(self._known[key] for key in keys)
 
     def innovations(
         self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray
@@ -104,23 +113,25 @@ class Follower:
 
 @cached
 def _innovations(measured, coordinates, rates, channels, whitening, group, last, out):
-    _, joints, models, recordings = coordinates.shape
+    """White errors of what is shown, some rows of all models at a time: the arrays run along models or along rows."""
+    rows, joints, models, recordings = coordinates.shape
     m = len(channels)
     error = np.zeros(m)
-    for p in range(models):
-        g = group[p]
-        for r in range(recordings):
-            for k in range(last[r] + 1):
-                for c in range(m):
-                    i = channels[c]
-                    shown = coordinates[k, i, p, r] if i < joints else rates[k, i - joints, p, r]
-                    error[c] = measured[k, i, r] - shown
-                for c in range(m):
-                    total = 0.0
-                    for d in range(c + 1):
-                        total += whitening[g, k, r, c, d] * error[d]
-                    # Also where it is not a number: a model that fell over is only counted so far.
-                    out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
+    for begin in range(0, rows, TOGETHER):
+        for p in range(models):
+            g = group[p]
+            for r in range(recordings):
+                for k in range(begin, min(begin + TOGETHER, last[r] + 1)):
+                    for c in range(m):
+                        i = channels[c]
+                        shown = coordinates[k, i, p, r] if i < joints else rates[k, i - joints, p, r]
+                        error[c] = measured[k, i, r] - shown
+                    for c in range(m):
+                        total = 0.0
+                        for d in range(c + 1):
+                            total += whitening[g, k, r, c, d] * error[d]
+                        # Also where it is not a number: a model that fell over is only counted so far.
+                        out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
 
 
 @cached

@@ -6,6 +6,7 @@ Jorgensen 2004, Parameter estimation in stochastic grey-box models, Automatica 4
 taken from it; the state itself follows the nonlinear model.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +21,6 @@ STEP = 1e-5  # [s] of the simulated steps from which accelerations are read off
 REACH = 1e-4  # of the differences [m, rad, m/s, rad/s]
 PROBE = 1e-3  # damping by which the answer to a force is found [N s/m or N m s/rad]
 GRID = 0.1  # [rad] between the angles about which the body is linearised
-JITTER = 0.1  # of the mean interval, a difference that gains need not follow
-SETTLED = 1e-5  # relative change of the variances in a row, below which they are taken for constant
 UNSETTLED = 100.0  # how much noisier forces count while the state is settling
 DIFFUSE = 1e4  # how much larger the variance of the first state is, which is read off noisy, perhaps late sensors
 UNHEARD = 1e6  # variance of a sensor that tells nothing [m^2, rad^2]
@@ -111,9 +110,9 @@ def _accelerations(batch: ModelBatch, states: np.ndarray) -> np.ndarray:
 
 
 def observer_gains(
-    linear: Linearisation, log: Log, levels: NoiseLevels, delays: tuple[float, ...] | None = None
-) -> Gains:
-    """Kalman gains along every recording.
+    linear: Linearisation, log: Log, levels: Sequence[NoiseLevels], delays: tuple[float, ...] | None = None
+) -> tuple[Gains, ...]:
+    """Kalman gains along every recording, for each of several noise levels.
 
     Args:
         linear: The body.
@@ -122,19 +121,24 @@ def observer_gains(
         delays: Delay of each coordinate's sensor [s]; None for none.
     """
     late = np.zeros(log.joints) if delays is None else np.array(delays)
-    gains, whitening = _riccati(
+    n, m = 2 * log.joints, len(log.channels)
+    gains = np.zeros((len(levels), *log.rows.shape, n, n))
+    whitening = np.zeros((len(levels), *log.rows.shape, m, m))
+    _riccati(
         linear.a,
         linear.b,
         linear.place,
         log.intervals,
         log.inputs.last,
         log.channels,
-        levels.force**2,
-        levels.sensor**2,
+        np.array([level.force**2 for level in levels]),
+        np.array([level.sensor**2 for level in levels]),
         late,
         log.inputs.t - log.inputs.t[0],
+        gains,
+        whitening,
     )
-    return Gains(gains, whitening)
+    return tuple(Gains(*each) for each in zip(gains, whitening, strict=True))
 
 
 @cached
@@ -152,136 +156,176 @@ def transition_over(a, dt, transition):
 
 
 @cached
-def _factorise(s, factor, inverse):
-    """Cholesky factor of a small matrix, and the inverse of the factor."""
-    m = len(s)
-    factor[:] = 0.0
-    inverse[:] = 0.0
-    for c in range(m):
-        for d in range(c + 1):
-            total = s[c, d]
-            for q in range(d):
-                total -= factor[c, q] * factor[d, q]
-            factor[c, d] = np.sqrt(max(total, 1e-300)) if c == d else total / factor[d, d]
-    for d in range(m):
-        inverse[d, d] = 1.0 / factor[d, d]
-        for c in range(d + 1, m):
-            total = 0.0
-            for q in range(d, c):
-                total -= factor[c, q] * inverse[q, d]
-            inverse[c, d] = total / factor[c, c]
+def _correct(covariance, i, j, late, noise, half, root):
+    """The covariance after a sensor of variance `noise` has shown state i, less `late` times state j.
+
+    The covariance loses half half', where half is the gain times the deviation of the innovation, 1 / root.
+    """
+    lanes = len(noise)
+    for a in range(4):
+        for w in range(lanes):
+            half[a, w] = covariance[a, i, w] - late * covariance[a, j, w]
+    for w in range(lanes):
+        root[w] = 1.0 / np.sqrt(half[i, w] - late * half[j, w] + noise[w])
+    for a in range(4):
+        for w in range(lanes):
+            half[a, w] *= root[w]
+    for a in range(4):
+        for b in range(4):
+            for w in range(lanes):
+                covariance[a, b, w] -= half[a, w] * half[b, w]
 
 
 @cached
-def _times(a, b, out):
-    """Product of two small matrices, without the overhead of a library call."""
-    for i in range(a.shape[0]):
-        for j in range(b.shape[1]):
-            total = 0.0
-            for q in range(a.shape[1]):
-                total += a[i, q] * b[q, j]
-            out[i, j] = total
+def _whiten(c, i, j, late, half, root, whitening):
+    """Row c of the inverse Cholesky factor of the innovations' covariance: what earlier channels foretell is taken."""
+    lanes = root.shape[1]
+    for d in range(c):
+        whitening[c, d] = 0.0
+        for e in range(d, c):
+            for w in range(lanes):
+                whitening[c, d, w] -= root[c, w] * (half[e, i, w] - late * half[e, j, w]) * whitening[e, d, w]
+    whitening[c, c] = root[c]
 
 
 @cached
-def _correct(covariance, h, sensor, gain, inverse, work):
-    """Kalman gain (n, m) and inverse factor of the innovations' covariance; the covariance after the correction."""
-    ph, s, factor, half, after = work
-    n, m = gain.shape
-    _times(covariance, h.T, ph)
-    _times(h, ph, s)
-    for c in range(m):
-        s[c, c] += sensor[c]
-    _factorise(s, factor, inverse)
-    _times(ph, inverse.T, half)
-    _times(half, inverse, gain)
-    _times(gain, ph.T, after)
-    for i in range(n):  # rounding must not make it lopsided
-        for j in range(i + 1):
-            covariance[i, j] -= 0.5 * (after[i, j] + after[j, i])
-            covariance[j, i] = covariance[i, j]
+def _predict(covariance, transition, half):
+    """The covariance one interval later, but for the forces."""
+    lanes = covariance.shape[2]
+    for a in range(4):
+        for b in range(4):
+            for w in range(lanes):
+                total = 0.0
+                for q in range(4):
+                    total += transition[a, q, w] * covariance[q, b, w]
+                half[a, b, w] = total
+    for a in range(4):
+        for b in range(a + 1):
+            for w in range(lanes):
+                total = 0.0
+                for q in range(4):
+                    total += half[a, q, w] * transition[b, q, w]
+                covariance[a, b, w] = total
+                covariance[b, a, w] = total
 
 
 @cached
-def _predict(covariance, transition, b, force, dt, half, after):
-    """The covariance one interval later; forces are white noise held over the interval."""
-    joints = len(force)
-    _times(transition, covariance, half)
-    _times(half, transition.T, after)
-    for i in range(joints):
-        for j in range(joints):
-            drive = 0.0
-            for q in range(joints):
-                drive += b[i, q] * b[j, q] * force[q]
-            after[i, j] += drive * dt**3 / 3.0
-            after[i, joints + j] += drive * 0.5 * dt * dt
-            after[joints + i, j] += drive * 0.5 * dt * dt
-            after[joints + i, joints + j] += drive * dt
-    covariance[:] = after
+def _shake(covariance, drive, dt):
+    """What white forces, held over the interval, add to the covariance."""
+    for i in range(2):
+        for j in range(2):
+            for w in range(len(dt)):
+                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0
+                covariance[i, 2 + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[2 + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[2 + i, 2 + j, w] += drive[i, j, w] * dt[w]
 
 
 @cached
-def _settled(covariance, before):
-    """Whether the variances hardly changed; remembers them."""
-    settled = True
-    for i in range(len(before)):
-        settled = settled and abs(covariance[i, i] - before[i]) < SETTLED * covariance[i, i]
-        before[i] = covariance[i, i]
-    return settled
+def _combine(half, whitening, gain):
+    """Gain by which each channel's error moves the states, shape (4, m, lanes): that of all channels at once."""
+    m, _, lanes = half.shape
+    gain[:] = 0.0
+    for q in range(4):
+        for d in range(m):
+            for c in range(d, m):
+                for w in range(lanes):
+                    gain[q, d, w] += half[c, q, w] * whitening[c, d, w]
 
 
 @cached
-def _seen_by(channels, late, joints):
-    """What the channels see of the state, shape (m, n): a late sensor sees d seconds of the rate less."""
-    h = np.zeros((len(channels), 2 * joints))
-    for c in range(len(channels)):
-        h[c, channels[c]] = 1.0
-        if channels[c] < joints:
-            h[c, channels[c] + joints] = -late[channels[c]]
-    return h
-
-
-@cached
-def _begin(covariance, sensor, factor):
-    """Coordinates known within some noise, rates within that over 20 ms, or worse by a factor of the variance."""
-    joints = len(covariance) // 2
-    covariance[:] = 0.0
-    for j in range(joints):
-        covariance[j, j] = 9.0 * factor * sensor[j]
-        covariance[joints + j, joints + j] = 9.0 * factor * sensor[j] / 0.02**2
-
-
-@cached
-def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time):
-    rows, recordings = place.shape
+def _move(a, b, place, interval, force, recording, recordings, transition, drive, dt):
+    """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
     joints = b.shape[1]
-    n, m = 2 * joints, len(channels)
-    gains = np.zeros((rows, recordings, n, n))
-    whitening = np.zeros((rows, recordings, m, m))
-    covariance, transition, half, after = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    gain, inverse, before, heard = np.zeros((n, m)), np.zeros((m, m)), np.zeros(n), np.zeros(m)
-    work = (np.zeros((n, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((n, m)), np.zeros((n, n)))
-    h = _seen_by(channels, late, joints)
+    own = np.zeros((2 * joints, 2 * joints))
+    transition_over(a[place], interval, own)
+    for level in range(len(force)):
+        w = level * recordings + recording
+        dt[w] = interval
+        for i in range(2 * joints):
+            for j in range(2 * joints):
+                transition[_among_four(i, joints), _among_four(j, joints), w] = own[i, j]
+        for i in range(joints):
+            for j in range(joints):
+                drive[i, j, w] = 0.0
+                for q in range(joints):
+                    drive[i, j, w] += b[place, i, q] * b[place, j, q] * force[level, q]
+
+
+@cached
+def _among_four(state, joints):
+    """Place of a state of a plant among those of two joints."""
+    return state if state < joints else 2 + state - joints
+
+
+@cached
+def _begin(covariance, sensor, time, k):
+    """At the first row the state is hardly known; once it has settled, as well as the sensors tell.
+
+    Coordinates are then known within some noise, rates within that over 20 ms.
+    """
+    levels, recordings = len(sensor), time.shape[1]
     for r in range(recordings):
-        _begin(covariance, sensor, DIFFUSE)
-        steady, usual = False, intervals[: last[r], r].mean()
-        for k in range(last[r] + 1):
-            if k > 0 and time[k - 1, r] <= SETTLES < time[k, r]:
-                _begin(covariance, sensor, 1.0)
-            if not steady:
-                for c in range(m):  # a late sensor shows at first what was before the recording
-                    late_by = late[channels[c]] if channels[c] < joints else 0.0
-                    heard[c] = sensor[c] if time[k, r] >= late_by else UNHEARD
-                _correct(covariance, h, heard, gain, inverse, work)
-            whitening[k, r] = inverse
-            for c in range(m):
-                gains[k, r, :, channels[c]] = gain[:, c]
-            if k == last[r]:
-                break
-            alike = place[k, r] == place[max(k, 1) - 1, r] and abs(intervals[k, r] - usual) < JITTER * usual
-            if not steady or not alike:
-                transition_over(a[place[k, r]], intervals[k, r], transition)
-                louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
-                _predict(covariance, transition, b[place[k, r]], louder * force, intervals[k, r], half, after)
-                steady = _settled(covariance, before) and alike and louder == 1.0
-    return gains, whitening
+        if k == 0 or time[k - 1, r] <= SETTLES < time[k, r]:
+            factor = DIFFUSE if k == 0 else 1.0
+            covariance[:, :, r::recordings] = 0.0
+            for level in range(levels):
+                for j in range(len(covariance) // 2):
+                    covariance[j, j, level * recordings + r] = 9.0 * factor * sensor[level, j]
+                    covariance[2 + j, 2 + j, level * recordings + r] = 9.0 * factor * sensor[level, j] / 0.02**2
+
+
+@cached
+def _hear(sensor, time, delay, noise):
+    """Variance of a sensor's noise: a late one shows at first what was before the recording."""
+    for level in range(len(sensor)):
+        for r in range(len(time)):
+            noise[level * len(time) + r] = sensor[level] if time[r] >= delay else UNHEARD
+
+
+@cached
+def _store(gain, inverse, channels, exists, gains, whitening):
+    """Write gains (L, R, n, n) and whitening (L, R, m, m) of one row, where a recording has it."""
+    levels, recordings, n, _ = gains.shape
+    for level in range(levels):
+        for r in range(recordings):
+            if exists[r]:
+                w = level * recordings + r
+                for c in range(len(channels)):
+                    for i in range(n):
+                        gains[level, r, i, channels[c]] = gain[_among_four(i, n // 2), c, w]
+                    for d in range(c + 1):
+                        whitening[level, r, c, d] = inverse[c, d, w]
+
+
+@cached
+def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, gains, whitening):
+    """Fill in gains (L, K + 1, R, n, n) and whitening (L, K + 1, R, m, m) of L noise levels.
+
+    A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes. A joint
+    that a plant lacks stays at zero, so that the other loops have constant lengths.
+    """
+    rows, recordings = place.shape
+    joints, m = b.shape[1], len(channels)
+    lanes = len(force) * recordings
+    covariance, work, transition = np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes))
+    drive, dt, noise = np.zeros((2, 2, lanes)), np.zeros(lanes), np.zeros(lanes)
+    half, root = np.zeros((m, 4, lanes)), np.zeros((m, lanes))
+    inverse, gain = np.zeros((m, m, lanes)), np.zeros((4, m, lanes))
+    for k in range(rows):
+        _begin(covariance, sensor, time, k)
+        for c in range(m):
+            i = _among_four(channels[c], joints)
+            j, delay = (i + 2, late[channels[c]]) if i < 2 else (i, 0.0)
+            _hear(sensor[:, c], time[k], delay, noise)
+            _correct(covariance, i, j, delay, noise, half[c], root[c])
+            _whiten(c, i, j, delay, half, root, inverse)
+        _combine(half, inverse, gain)
+        _store(gain, inverse, channels, k <= last, gains[:, k], whitening[:, k])
+        if k == rows - 1:
+            break
+        for r in range(recordings):
+            louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
+            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, transition, drive, dt)
+        _predict(covariance, transition, work)
+        _shake(covariance, drive, dt)
