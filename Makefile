@@ -23,8 +23,8 @@ $(READY): requirements.lock pyproject.toml
 	$(PY) -m pip install --quiet --no-deps --editable .
 	@touch $@
 
-demo: $(READY)  ## run the whole pipeline; RECORDINGS=folder diagnoses that robot instead
-	$(PY) -m wipx $(if $(RECORDINGS),task=diagnose "recordings.path='$(RECORDINGS)'",task=pipeline)
+demo: $(READY)  ## the whole chain on an emulated testbed, one page (PROFILE=full: as many loads and trials as the paper); RECORDINGS=folder diagnoses that robot instead
+	$(PY) -m wipx $(if $(RECORDINGS),task=diagnose "recordings.path='$(RECORDINGS)'",task=pipeline$(SUFFIX))
 
 real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx +experiment=real_recordings task.page=docs/real_recordings.md
