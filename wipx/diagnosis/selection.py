@@ -17,7 +17,7 @@ from wipx.diagnosis.nested import simple_values, simpler
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import Prospect, prospects
 
-MOST_EFFECTS = 4
+MOST_EFFECTS = 8
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 CONSIDERED = 6  # effects that are fitted in each step

@@ -1,9 +1,11 @@
 """The answer of a diagnosis in words."""
 
 from wipx.core.diagnosis import Diagnosis, FoundEffect
+from wipx.core.results import FitErrors
 from wipx.core.words import effect_in_words
 
 FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
+HOPELESS = 25.0  # likewise, from which no model counts as an explanation; noisy drives alone make up to about 15
 
 
 def sentence(diagnosis: Diagnosis) -> str:
@@ -14,7 +16,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
     verb = "was" if len(parts) == 1 else "were"
     named = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {'it' if len(parts) == 1 else 'them'} explains"
-    if diagnosis.verdict == "consistent" and (ratio := _times_the_floor(diagnosis)) > FAR_OFF:
+    if diagnosis.verdict == "consistent" and (ratio := times_the_floor(diagnosis.held_out)) > FAR_OFF:
         return (
             "No missing effect shows itself from row to row, but predictions over "
             f"{diagnosis.held_out.horizon:g} s are {ratio:.0f} times worse than sensor noise makes them: "
@@ -42,9 +44,8 @@ def explained_share(diagnosis: Diagnosis) -> float:
     return removed / total if total > 0.0 else 0.0
 
 
-def _times_the_floor(diagnosis: Diagnosis) -> float:
-    """The largest held-out error over its noise floor."""
-    errors = diagnosis.held_out
+def times_the_floor(errors: FitErrors) -> float:
+    """The largest error of the completed model over its noise floor."""
     return max(errors.completed[name] / max(floor, 1e-15) for name, floor in errors.noise_floor.items())
 
 
