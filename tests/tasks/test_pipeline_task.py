@@ -58,6 +58,9 @@ def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(prog
     again = program("task=pipeline", *SHORT, "hydra.run.dir=out")
     assert again.status == 0, again.error
     assert again.out == answer.out
+    other = program("task=pipeline", *SHORT, "seed=5", "hydra.run.dir=out")
+    assert other.status == 2
+    assert "begun by another command" in other.error
 
 
 @pytest.mark.parametrize(
@@ -66,6 +69,7 @@ def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(prog
         (("friction=paper",), "friction=paper: task=pipeline has no use for it"),
         (("target=recordings", "target.path=."), "drives a robot"),
         (("task.loads=[]",), "task.loads is empty"),
+        (("task.loads=[c9]",), "unknown load 'c9'"),
         (("task.fitted=0",), "fitted"),
     ],
 )

@@ -3,13 +3,13 @@
 Recording is done here. All that follows are stages: commands of this program, which stand in their folders.
 """
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from tqdm import tqdm
 
-from wipx.core.errors import InputError, check_positive
+from wipx.control.lqr import Lqr
+from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.hardware.excitations import KINDS, excitation
@@ -19,7 +19,7 @@ from wipx.tasks.control_scenarios import ScenarioName
 from wipx.tasks.job import Job
 from wipx.tasks.progress import StageProgress
 from wipx.tasks.results import write_csv, written_together
-from wipx.tasks.stages import Chain, Stage
+from wipx.tasks.stages import Chain, Stage, claim
 from wipx.tasks.story import leave_story
 from wipx.tasks.trials import write_robot
 
@@ -34,8 +34,7 @@ class Pipeline:
     """Take a robot that differs from its simulation to one that balances a load that it does not know.
 
     Attributes:
-        recorded_with: Controller of the robot without load; with a load it is the baseline.
-        fitted: Recordings of the robot without load.
+        fitted: Recordings of the robot without load, under `controller=lqr`, which with a load is the baseline.
         fresh: Further ones, which no fit sees.
         duration: Of each [s].
         log_every: Ticks of the loop per row of the log; a row has the mean of their commands.
@@ -46,7 +45,6 @@ class Pipeline:
         scenarios: What is done with them.
     """
 
-    recorded_with: dict[str, Any] = field(default_factory=dict)
     fitted: int = 5
     fresh: int = 2
     duration: float = 8.0
@@ -72,8 +70,9 @@ class Pipeline:
 
     def run(self, job: Job) -> None:
         """Record, run all stages, tell the story."""
-        target = _target(job)
+        target = self._target(job)
         forwarded = _forwarded(job)
+        claim(job.out, job.overrides)
         self._record(job, target)
         with StageProgress("pipeline") as progress:
             chain = Chain(job.out, progress)
@@ -82,13 +81,23 @@ class Pipeline:
             chain.run(*self._driving(job, forwarded))
         print(leave_story(job.out, target, self.scenarios))
 
+    def _target(self, job: Job) -> Target:
+        """The robot, if it can be driven and has the loads."""
+        target: Target | RecordingSource = job.part("target")
+        if isinstance(target, RecordingSource):
+            raise InputError("task=pipeline drives a robot; use task=diagnose recordings.path=... for recordings")
+        for name in self.loads:
+            if name not in target.loads:
+                raise unknown_name("load", name, target.loads, "task.loads")
+        return target
+
     def _record(self, job: Job, target: Target) -> None:
         """Recordings of the robot without load, in the contract's format; made once."""
         names = [*(f"r{i + 1}.csv" for i in range(self.fitted)), *self._fresh]
         if (job.out / "recordings").is_dir():
             return
         nominal: Model = job.part("plant").nominal(target.nominal())
-        controller = job.build(self.recorded_with, "task.recorded_with")
+        controller = Lqr()
         rng = np.random.default_rng(job.seed)
         trials = [self._trial(k, name, nominal, rng) for k, name in enumerate(names)]
         with written_together(job.out) as folder:
@@ -151,14 +160,6 @@ class Pipeline:
             stages.append(Stage(f"{scenario}-baseline", (*own, "controller=lqr"), share))
             stages.append(Stage(f"{scenario}-ours", (*own, *ours), share))
         return stages
-
-
-def _target(job: Job) -> Target:
-    """The robot, if it can be driven."""
-    target: Target | RecordingSource = job.part("target")
-    if isinstance(target, RecordingSource):
-        raise InputError("task=pipeline drives a robot; use task=diagnose recordings.path=... for recordings")
-    return target
 
 
 def _forwarded(job: Job) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -76,12 +76,11 @@ class Chain:
     def _run(self, stage: Stage, beside: int) -> None:
         """Run one stage on its share of the cores."""
         folder = self.out / stage.name
-        arguments = [*stage.overrides, f"hydra.run.dir='{folder}'"]
-        line = shlex.join(["python", "-m", "wipx", *arguments])
-        if _finished(folder, line):
-            return
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / COMMAND).write_text(f"{line}\n", encoding="utf-8")
+        arguments = (*stage.overrides, f"hydra.run.dir='{folder}'")
+        claim(folder, arguments)
+        if (folder / SETTINGS).is_file():
+            return
         threads = str(max(1, (os.cpu_count() or 1) // beside))
         environment = {**os.environ, **ONE_THREAD, "NUMBA_NUM_THREADS": threads}
         with (folder / LOG).open("w", encoding="utf-8") as log:
@@ -101,18 +100,18 @@ class Chain:
             raise RuntimeError(f"stage {stage.name}: exit status {status}, see {folder / LOG}")
 
 
-def _finished(folder: Path, line: str) -> bool:
-    """Whether a stage has finished before.
+def claim(folder: Path, arguments: Sequence[str]) -> None:
+    """Note the command whose results a folder takes.
 
     Raises:
-        InputError: it has, but by another command.
+        InputError: the folder has been begun by another command.
     """
-    if not (folder / SETTINGS).is_file():
-        return False
-    before = (folder / COMMAND).read_text(encoding="utf-8").strip()
+    line = shlex.join(["python", "-m", "wipx", *arguments])
+    note = folder / COMMAND
+    before = note.read_text(encoding="utf-8").strip() if note.is_file() else line
     if before != line:
-        raise InputError(f"{folder}: made by another command, {before}; set another hydra.run.dir")
-    return True
+        raise InputError(f"{folder}: begun by another command, {before}; set another hydra.run.dir")
+    note.write_text(f"{line}\n", encoding="utf-8")
 
 
 def _last_line(log: Path) -> str:
