@@ -25,7 +25,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class SignalError:
-    """Root mean square prediction error of a signal on held-out recordings, in the column's unit.
+    """Root mean square prediction error of a signal on recordings that no fit saw, in the column's unit.
 
     Attributes:
         column: The signal.

@@ -354,7 +354,7 @@ class _Case:
                     self._heldout_gain(repeated, reduced[effect]),
                     probability,
                     gains[effect] / total,
-                    law_curve(self.fitter, reduced[effect], fit, effect, shapes),
+                    law_curve(self.fitter, self._taken_out(fit, effect), fit, effect, shapes),
                 )
             )
         return tuple(found)
@@ -362,16 +362,30 @@ class _Case:
     def _reduced(self, selection: Selection, fit: Fit, effect: str) -> Fit:
         """The fit without one effect, its stand-in kept."""
         rest = tuple(e for e in fit.effects if e != effect)
-        if fit.hypothesis.space.model.effects.keys() <= {*self.setting.nominal.effects, *fit.effects}:
+        setting = self._setting_of(fit)
+        if setting is self.setting:
             return selection.fitted(rest, fit) if rest else selection.nominal
+        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
+        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+
+    def _taken_out(self, fit: Fit, effect: str) -> Fit:
+        """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
+        rest = tuple(e for e in fit.effects if e != effect)
+        hypothesis = Hypothesis.of(self._setting_of(fit), rest, fit.hypothesis.values)
+        found = self.fitter.fit(hypothesis, fit.levels, steps=0)
+        return replace(found, jacobian=found.jacobian[:, :0])
+
+    def _setting_of(self, fit: Fit) -> Setting:
+        """The robot, with the stand-in of a fit where it has one."""
+        model = fit.hypothesis.space.model
         extra = {
-            name: fit.hypothesis.space.model.effects[name]
-            for name in fit.hypothesis.space.model.effects
+            name: values
+            for name, values in model.effects.items()
             if name not in fit.effects and name not in self.setting.nominal.effects
         }
-        richer = Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
-        hypothesis = Hypothesis.of(richer, rest, fit.hypothesis.values)
-        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+        if not extra:
+            return self.setting
+        return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
 
     def _heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
         """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""

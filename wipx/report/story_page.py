@@ -91,7 +91,7 @@ def story_in_words(story: Story) -> str:
     before, after = (1e3 * found.recorded.rmse for found in (story.before, story.after))
     sentences = [
         _named(story),
-        f"Prediction error over {compact(story.horizon)} s on held-out recordings: {errors}.",
+        f"Prediction error over {compact(story.horizon)} s on recordings that nothing had seen: {errors}.",
         f"Balance of loaded robots, estimated from {compact(_seconds(story))} s of motion: error {significant(before)} "
         f"mrad if learned in the nominal simulation, {significant(after)} mrad if learned in the completed one.",
     ]

@@ -77,7 +77,8 @@ class Pipeline:
         with StageProgress("pipeline") as progress:
             chain = Chain(job.out, progress)
             chain.run(self._diagnosis(job, forwarded))
-            chain.run(*(self._training(job, forwarded, name) for name in ("nominal", "estimator")))
+            training = (self._training(job, forwarded, name) for name in ("nominal", "estimator"))
+            chain.run(self._prediction(job, forwarded), *training)
             chain.run(*self._driving(job, forwarded))
         print(leave_story(job.out, target, self.scenarios))
 
@@ -93,7 +94,7 @@ class Pipeline:
 
     def _record(self, job: Job, target: Target) -> None:
         """Recordings of the robot without load, in the contract's format; made once."""
-        names = [*(f"r{i + 1}.csv" for i in range(self.fitted)), *self._fresh]
+        names = [*(f"r{i + 1}.csv" for i in range(self.fitted)), *(f"fresh{i + 1}.csv" for i in range(self.fresh))]
         if (job.out / "recordings").is_dir():
             return
         nominal: Model = job.part("plant").nominal(target.nominal())
@@ -112,24 +113,25 @@ class Pipeline:
         pitch = rng.uniform(*RELEASED_AT) if number % KINDS == 0 else rng.uniform(-LEANING, LEANING)
         return Trial(name, self.duration, pitch=pitch, reference=excitation(number, nominal.plant, rng))
 
-    @property
-    def _fresh(self) -> list[str]:
-        """Names of the recordings that no fit sees."""
-        return [f"fresh{i + 1}.csv" for i in range(self.fresh)]
-
     def _diagnosis(self, job: Job, forwarded: tuple[str, ...]) -> Stage:
         """What the nominal model lacks, from the recordings alone."""
+        own = ("task=diagnose", f"recordings.path='{job.out}/recordings'", "recordings.files=['r*.csv']")
+        return Stage("diagnosis", (*own, *_of_groups(forwarded, *EVERYWHERE)), 0.6)
+
+    def _prediction(self, job: Job, forwarded: tuple[str, ...]) -> Stage:
+        """How well nominal and completed model predict recordings that nothing has seen."""
         own = (
-            "task=diagnose",
+            "task=predict",
             f"recordings.path='{job.out}/recordings'",
-            f"recordings.held_out=[{','.join(self._fresh)}]",
+            "recordings.files=['fresh*.csv']",
+            f"model.path='{job.out}/diagnosis/model.yaml'",
         )
-        return Stage("diagnosis", (*own, *_of_groups(forwarded, *EVERYWHERE)), 0.4)
+        return Stage("prediction", (*own, *_of_groups(forwarded, *EVERYWHERE)), 0.02)
 
     def _training(self, job: Job, forwarded: tuple[str, ...], name: str) -> Stage:
         """An estimator of the pitch at which a loaded robot balances, trained in simulation."""
         own = ("task=train", f"task.length={self.length}", *self._simulation(job, name))
-        return Stage(name, (*own, *_of_groups(forwarded, *EVERYWHERE, "target", "estimator")), 0.15)
+        return Stage(name, (*own, *_of_groups(forwarded, *EVERYWHERE, "target", "estimator")), 0.07)
 
     def _simulation(self, job: Job, name: str) -> tuple[str, ...]:
         """The nominal simulation, or the completed one, and the robots that are simulated in it."""
@@ -156,7 +158,7 @@ class Pipeline:
         stages = []
         for scenario in self.scenarios:
             own = ("task=control", f"task.scenario={scenario}", *loads, *simulation, *everywhere)
-            share = 0.3 / (2 * len(self.scenarios))
+            share = 0.24 / (2 * len(self.scenarios))
             stages.append(Stage(f"{scenario}-baseline", (*own, "controller=lqr"), share))
             stages.append(Stage(f"{scenario}-ours", (*own, *ours), share))
         return stages

@@ -44,9 +44,7 @@ def leave_story(out: Path, target: Target, scenarios: tuple[ScenarioName, ...]) 
 def _story(out: Path, target: Target, scenarios: tuple[ScenarioName, ...]) -> Story:
     source = RecordingSource(path=str(out / "recordings"))
     recordings = source.load()
-    diagnosis = _read_diagnosis(out / "diagnosis" / "diagnosis.json")
-    fit = diagnosis["fit"]
-    judged = fit["heldout"]
+    diagnosis, judged = _read(out / "diagnosis" / "diagnosis.json"), _read(out / "prediction" / "metrics.json")
     hidden = target.hidden() if isinstance(target, EmulatedTestbed) else None
     return Story(
         target=type(target).__name__,
@@ -56,10 +54,10 @@ def _story(out: Path, target: Target, scenarios: tuple[ScenarioName, ...]) -> St
         duration=round(recordings[0].duration, 1),
         verdict=diagnosis["verdict"],
         effects=tuple(_effect(found) for found in diagnosis["effects"]),
-        horizon=fit["horizon_s"],
+        horizon=judged["horizon_s"],
         errors=tuple(
-            SignalError(column, value, judged["completed"][column], judged["noise_floor"][column])
-            for column, value in judged["nominal"].items()
+            SignalError(column, value, judged["rms"][column], judged["noise_floor"][column])
+            for column, value in judged["rms_nominal"].items()
         ),
         hidden=None if hidden is None else hidden.model,
         hidden_signals={} if hidden is None else hidden.beside_the_model(),
@@ -71,7 +69,7 @@ def _story(out: Path, target: Target, scenarios: tuple[ScenarioName, ...]) -> St
     )
 
 
-def _read_diagnosis(path: Path) -> dict[str, Any]:
+def _read(path: Path) -> dict[str, Any]:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
