@@ -140,7 +140,7 @@ def test_the_torque_residual_of_the_true_model_vanishes_without_noise(effects: E
     recordings = record(effects, np.random.default_rng(fresh_seed), noise=0.0, drive=0.1)
     data = TorqueData(motions(recordings, plant_of("pendulum"), np.array([NOISE])))
     true, nominal = (np.std(data.residual(pendulum(e))) for e in (effects, {}))
-    assert true < 0.05 * nominal  # the filter does not commute with the sine of the angle; small swings
+    assert true < 0.1 * nominal  # the filter does not commute with the sine of the angle; small swings
 
 
 def silent(joints: int, features: int) -> ResidualAcceleration:
