@@ -52,6 +52,7 @@ LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
+TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 SHORTEST_HALVED = 2.0  # [s]
 
@@ -121,7 +122,7 @@ def diagnose(
     watcher("noise of the nominal model", 0.02)
     start = Hypothesis.of(case.setting, (), {})
     nominal = case.fitter.polished(case.fitter.fit(start, case.first_levels))
-    selection = Selection(case.fitter, case.setting, nominal)
+    selection = Selection(case.fitter, case.setting, nominal, case.transfers)
     watcher("looking for missing effects", 0.1)
     first = selection.extensions(nominal)
     if case.is_driven:
@@ -183,6 +184,10 @@ class _Case:
     def is_driven(self) -> bool:
         """Whether any command ever changes."""
         return bool(np.ptp(self.log.inputs.commands, axis=0).max() > 0.0)
+
+    def transfers(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
+        return self._heldout_gain(transfer(self.fitter, larger), smaller) > -TOLERATED
 
     def confirmed(self, selection: Selection, fit: Fit) -> Fit:
         """Without effects that change no prediction to speak of, or do not transfer to held-out recordings."""

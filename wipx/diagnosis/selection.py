@@ -6,6 +6,7 @@ more than the noise model has it, and a step must also be worth a share of what 
 that the small print of a law is not filled up with further effects.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +19,9 @@ from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import Prospect, prospects
 
 MOST_EFFECTS = 8
+FREE_EFFECTS = (
+    4  # beyond them an effect must also transfer: what is left unexplained is easily filled up with small ones
+)
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 CONSIDERED = 6  # effects that are fitted in each step
@@ -32,6 +36,11 @@ EXCHANGES = 3  # rounds at most
 LEAST_LEAD = 2.0  # nats by which a replacement must be better
 
 
+def taken_for_granted(smaller: Fit, larger: Fit) -> bool:
+    """A transfer that nobody checks."""
+    return True
+
+
 @dataclass
 class Selection:
     """The search for the missing effects of one robot.
@@ -40,12 +49,14 @@ class Selection:
         fitter: Fits hypotheses.
         setting: The robot.
         nominal: The fit of the nominal model.
+        transfers: Whether a larger fit predicts recordings that it was not fitted to about as well as a smaller one.
         considered: What was looked at, in order.
     """
 
     fitter: Fitter
     setting: Setting
     nominal: Fit
+    transfers: Callable[[Fit, Fit], bool] = taken_for_granted
     considered: list[Candidate] = field(default_factory=list)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
@@ -70,6 +81,9 @@ class Selection:
                 self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
                 current = self.pruned(best)
                 continue
+            if len(best.effects) > FREE_EFFECTS and not self.transfers(current, best):
+                self._remember(current, extended, None)
+                break
             self._remember(current, extended, best)
             current = self.pruned(best)
         return self.exchanged(current)
@@ -107,7 +121,7 @@ class Selection:
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
-        if len(current.effects) + 2 > MOST_EFFECTS:
+        if len(current.effects) + 2 > FREE_EFFECTS:
             return None
         for one in extended[:PAIRED]:
             if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
