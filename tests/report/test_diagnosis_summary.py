@@ -1,10 +1,7 @@
 """The terminal shows the answer in a few lines."""
 
-from dataclasses import replace
-
 from report import synthetic_diagnosis
 
-from wipx.core.diagnosis import Unexplained
 from wipx.report.diagnosis_summary import summary
 from wipx.report.diagnosis_words import nats, percent, probability
 
@@ -37,15 +34,6 @@ def test_summary_of_the_unexplained_says_what_is_left():
     text = summary(synthetic_diagnosis.unexplained())
     assert "left over at the rail joint (p < 0.0001)" in text
     assert "It resembles load-dependent gear friction" in text
-
-
-def test_effects_that_do_not_predict_are_no_explanation():
-    left = Unexplained(True, 0.4, None, "an error of predictions 30 times the sensor noise", (), None)
-    text = summary(replace(synthetic_diagnosis.unexplained(), unexplained=left))
-    assert (
-        "A significant part is left over that no effect of the vocabulary explains: an error of predictions 30" in text
-    )
-    assert "p = 0.4" not in text
 
 
 def test_probabilities_never_claim_certainty():

@@ -17,7 +17,7 @@ from wipx.core.diagnosis import (
 )
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.core.results import Estimate, FitErrors
+from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words
 from wipx.diagnosis.curves import law_curve
 from wipx.diagnosis.experiment import Question, next_experiment
@@ -35,7 +35,7 @@ from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.sanity import check_plausible
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
-from wipx.diagnosis.sentence import FAR_OFF, HOPELESS, sentence, times_the_floor
+from wipx.diagnosis.sentence import FAR_OFF, sentence, times_the_floor
 from wipx.diagnosis.stand_in import curve_of, with_curve
 from wipx.effects.catalogue import effect_of
 from wipx.identify.evaluation import Judge
@@ -274,8 +274,8 @@ class _Case:
         fitted, _ = self.judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)
         ends = estimates(self.fitter, fit, selection.nominal)
         effects = self._effects(selection, rest, repeated, ends, shapes)
-        unexplained = self._unexplained(rest, held_out)
-        verdict: Verdict = "unexplained" if unexplained.significant else "mismatch" if effects else "consistent"
+        verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
+        unexplained = self._unexplained(rest)
         location = located(self.fitter, selection.nominal, fit, effects, unexplained.site)
         draft = Diagnosis(
             title="",
@@ -424,17 +424,13 @@ class _Case:
         rivals.sort(key=lambda rival: rival.separation)
         return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 
-    def _unexplained(self, rest: _Rest, held_out: FitErrors) -> Unexplained:
+    def _unexplained(self, rest: _Rest) -> Unexplained:
         beyond = [name for name in rest.fit.effects if effect_of(name, self.log.plant).beyond]
         if rest.significant and beyond:
             words = " and ".join(effect_in_words(name, self.log.plant.kind) for name in beyond)
             return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
         if not rest.significant or rest.strongest is None:
-            # What shows in no row may add up: named effects must predict, too.
-            ratio = times_the_floor(held_out)
-            lost = bool(rest.fit.effects) and ratio > HOPELESS
-            words = f"an error of predictions {ratio:.0f} times the sensor noise" if lost else ""
-            return Unexplained(lost, rest.p_value, None, words, (), None)
+            return Unexplained(False, rest.p_value, None, "", (), None)
         shape = rest.strongest.shape
         site = self.log.plant.joints[shape.joint]
         words = {

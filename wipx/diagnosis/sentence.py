@@ -5,7 +5,6 @@ from wipx.core.results import FitErrors
 from wipx.core.words import effect_in_words
 
 FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
-HOPELESS = 25.0  # likewise, from which no model counts as an explanation; noisy drives alone make up to about 15
 
 
 def sentence(diagnosis: Diagnosis) -> str:

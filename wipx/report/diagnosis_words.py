@@ -118,7 +118,7 @@ def period_sentence(period: Period) -> str:
 def unexplained_sentence(diagnosis: Diagnosis) -> str:
     """What the named effects leave over, in one or two sentences."""
     left = diagnosis.unexplained
-    chance = p_value(left.p_value) if left.site or not left.significant else ""
+    chance = p_value(left.p_value)
     aside = f" ({chance})" if chance else ""
     if not left.significant:
         return f"Nothing significant is left over{aside}: what remains looks like sensor noise."
