@@ -19,9 +19,7 @@ from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import Prospect, prospects
 
 MOST_EFFECTS = 8
-FREE_EFFECTS = (
-    4  # beyond them an effect must also transfer: what is left unexplained is easily filled up with small ones
-)
+FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill up what nothing explains
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 CONSIDERED = 6  # effects that are fitted in each step
@@ -82,7 +80,11 @@ class Selection:
                 current = self.pruned(best)
                 continue
             if len(best.effects) > FREE_EFFECTS and not self.transfers(current, best):
-                self._remember(current, extended, None)
+                self.considered.append(
+                    Candidate(
+                        best.effects[-1], self.evidence(current, best), False, "predicts held-out recordings worse"
+                    )
+                )
                 break
             self._remember(current, extended, best)
             current = self.pruned(best)
