@@ -25,6 +25,7 @@ LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
 LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
 THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
+SPREADS = (2.0, 1.4, 1.15)  # factors by which the spread of single commands is changed, in turn
 POLISHED = 0.5  # nats at which alternating ends
 
 
@@ -96,7 +97,7 @@ class Fitter:
         """Noise levels and values in turn until neither gains more."""
         for _ in range(rounds):
             before = fit.log_likelihood
-            fit = self.fit(fit.hypothesis, self.levels_of(fit))
+            fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
             if fit.log_likelihood - before < POLISHED:
                 break
         return fit
@@ -104,8 +105,7 @@ class Fitter:
     def levels_of(self, fit: Fit) -> NoiseLevels:
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
-        The levels' common factor does not matter: the first sensor's level is kept. Where the log has means of
-        commands and the model a threshold for them, the spread of the single commands is searched too.
+        The levels' common factor does not matter: the first sensor's level is kept.
 
         Args:
             fit: Where to start.
@@ -114,7 +114,7 @@ class Fitter:
         levels = self._with_spread(fit)
         search = _LevelSearch(self, fit.hypothesis, levels)
         centre = best = _logarithms(levels)
-        free = [i for i in range(len(best) - (levels.spread == 0.0)) if i != fixed]
+        free = [i for i in range(len(best)) if i != fixed]
         for step in LEVEL_STEPS:
             move = np.zeros_like(best)
             for _ in range(12):
@@ -138,7 +138,23 @@ class Fitter:
         matters = averaged and not kinds.isdisjoint(THRESHOLDS)
         if matters == (fit.levels.spread > 0.0):
             return fit.levels
-        return replace(fit.levels, spread=log.command_noise if matters else 0.0)
+        return replace(fit.levels, spread=log.command_spread if matters else 0.0)
+
+    def _with_best_spread(self, fit: Fit) -> Fit:
+        """A fit with the spread of single commands that suits it best, where it has one.
+
+        Thresholds are tied to the spread, so the values follow it at every try.
+        """
+        for factor in SPREADS if fit.levels.spread > 0.0 else ():
+            for change in (factor, 1.0 / factor):
+                there = self._at_spread(fit, change)
+                while there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
+                    fit, there = there, self._at_spread(there, change)
+        return fit
+
+    def _at_spread(self, fit: Fit, change: float) -> Fit:
+        levels = replace(fit.levels, spread=change * fit.levels.spread)
+        return self.fit(fit.hypothesis, levels, steps=3)
 
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
         """White innovations of other models, with observer and colour of a fit, shape (P, R m (K + 1))."""
@@ -253,13 +269,13 @@ def _around(cube: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _logarithms(levels: NoiseLevels) -> np.ndarray:
-    return np.log(np.concatenate([levels.force, levels.sensor, [max(levels.spread, 1e-300)]]))
+    return np.log(np.concatenate([levels.force, levels.sensor]))
 
 
 def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
     values = np.exp(logarithms)
     joints = len(like.force)
-    return NoiseLevels(values[:joints], values[joints:-1], float(values[-1]) if like.spread > 0.0 else 0.0)
+    return NoiseLevels(values[:joints], values[joints:], like.spread)
 
 
 def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.ndarray:

@@ -84,10 +84,13 @@ class Log:
         return np.where(self.rows[1:], np.diff(self.inputs.t, axis=0), 0.0)
 
     @property
-    def command_noise(self) -> float:
-        """Standard deviation of what is noise in the commands from row to row [N or N m]."""
-        fourth = [np.diff(r[name], 4) for r in self.recordings for name in self.plant.commands]
-        return max(1.4826 * float(np.median(np.abs(np.concatenate(fourth)))) / np.sqrt(70.0), 1e-9)
+    def command_spread(self) -> float:
+        """Half width by which single commands scatter about a row's mean, if they are noisy like the means [N or N m]."""
+        scaled = [
+            np.diff(r[name], 4) * np.sqrt(max(r.periods - 1, 0)) for r in self.recordings for name in self.plant.commands
+        ]
+        deviation = 1.4826 * float(np.median(np.abs(np.concatenate(scaled)))) / np.sqrt(70.0)
+        return max(np.sqrt(6.0) * deviation, 1e-9)  # a triangle is sqrt(6) standard deviations wide to either side
 
     @cached_property
     def surprises(self) -> np.ndarray:
