@@ -213,6 +213,21 @@ def test_the_drive_pushes_again_only_after_the_whole_gap():
     assert force[-1] == pytest.approx(1.0, abs=1e-11)
 
 
+def test_a_drive_that_returns_its_momentum_makes_the_motion_late_and_no_slower():
+    gap, inertia, mass = 4e-3, 0.2, 2.0  # the drive's inertia is part of the mass that the owner weighed
+    law = {"gap": gap, "drive_inertia": inertia, "drive_damping": 0.0, "returned": 1.0}
+    commands = np.where(T[:-1] < 0.1, 3.0, -3.0)
+    axis = {"wheel_mass": mass, "body_mass": 0.0}
+    loose = move(robot("linear_axis", {"actuator/backlash": law}, axis), (0.0, 0.0), T, commands)
+    rigid = move(robot("linear_axis", {}, axis), (0.0, 0.0), T, commands)
+    free = (mass - inertia) * inertia / mass  # drive and carriage part from each other with the reduced mass
+    crossed = T >= 0.1 + np.sqrt(2.0 * gap * free / 3.0) + 8e-3
+    np.testing.assert_allclose(loose.v[crossed, 0], rigid.v[crossed, 0], atol=1e-9)
+    # The centre of mass moves as if rigid: the drive is a gap further back, so the carriage that much further ahead.
+    ahead = loose.q[crossed, 0] - rigid.q[crossed, 0]
+    np.testing.assert_allclose(ahead, gap * inertia / mass, rtol=0.08)
+
+
 def test_actuator_effects_act_on_every_driven_joint():
     t = np.linspace(0.0, 0.1, 51)
     commands = np.tile([1.0, -1.0], (50, 1))

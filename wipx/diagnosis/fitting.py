@@ -138,7 +138,7 @@ class Fitter:
         matters = averaged and not kinds.isdisjoint(THRESHOLDS)
         if matters == (fit.levels.spread > 0.0):
             return fit.levels
-        return replace(fit.levels, spread=log.command_spread if matters else 0.0)
+        return replace(fit.levels, spread=1.0 if matters else 0.0)
 
     def _with_best_spread(self, fit: Fit) -> Fit:
         """A fit with the spread of single commands that suits it best, where it has one.
@@ -198,6 +198,15 @@ class Fitter:
         slopes = np.zeros((white.size + priors.shape[1], cubes.shape[1]))
         best = hypothesis.at(cubes[i])
         return Fit(best, levels, colours[i], white, int(log.counted.sum()), slopes, likelihoods[i])
+
+    def likeliest(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels, count: int) -> list[Hypothesis]:
+        """The likeliest few of hypotheses of the same effects, as they are."""
+        cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
+        innovations = self._innovations(hypotheses[0], cubes, levels)
+        priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
+        log = self.follower.log
+        likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
+        return [hypotheses[i] for i in np.argsort(-likelihoods)[:count]]
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
         gains = self.follower.gains(levels, hypothesis.model)

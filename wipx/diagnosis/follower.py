@@ -69,7 +69,7 @@ class Follower:
             batch: P models.
             gains: Of one or more observers.
             group: Which of them each model has, shape (P,).
-            spread: Half width of the single commands, shape (P,) [N or N m].
+            spread: Of the single commands, in multiples of `Log.command_spread`, shape (P,).
         """
         log = self.log
         shown = self._shown(batch, gains, group, spread)
@@ -94,7 +94,13 @@ class Follower:
             batch,
             self.log.inputs,
             start,
-            Observer(self.log.measured, corrections, group, spread, reports=self.log.reported.shape[1] > 0),
+            Observer(
+                self.log.measured,
+                corrections,
+                group,
+                np.outer(spread, self.log.command_spread),
+                reports=self.log.reported.shape[1] > 0,
+            ),
         )
 
     @cached_property

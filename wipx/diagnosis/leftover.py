@@ -14,16 +14,14 @@ from scipy import stats
 from wipx.core.plant import Plant
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.log import Log
-from wipx.diagnosis.observer import Gains, Linearisation, transition_over
+from wipx.diagnosis.response import direction, motion_of, response
 from wipx.diagnosis.robust import stretches, sums_over
-from wipx.diagnosis.whiteness import whitened_change
 from wipx.effects.remainder import KNOTS
 from wipx.sim.cache import cached
 
 ENDS = (0.005, 0.995)  # quantiles of a signal between which its knots lie
 FREQUENCIES = np.geomspace(0.5, 16.0, 12)  # [Hz] of resonances that are looked for
 DAMPING = 0.05  # ratio, of the same
-SLOW = 0.02  # of the largest speed, at which half of dry friction has built up
 RIDGE = 1e-9
 
 
@@ -63,28 +61,10 @@ class Leftover:
     slopes: np.ndarray
 
 
-def signals_of(fitter: Fitter, fit: Fit) -> dict[str, np.ndarray]:
-    """Coordinates, rates, commands and time at every row, shape (K + 1, R) each.
-
-    Coordinates and rates are those that the fit's observer expects: a force made of them knows nothing of the
-    noise of the row that it is tested on.
-    """
-    log = fitter.follower.log
-    plant = log.plant
-    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
-    state = fitter.follower.estimated(fit.hypothesis.model, gains, fit.levels.spread)
-    signals = {name: state[:, i] for i, name in enumerate((*plant.coordinates, *plant.rates))}
-    for c, name in enumerate(plant.commands):
-        commands = log.inputs.commands[:, c]
-        signals[name] = np.concatenate([commands, commands[-1:]])
-    signals["t"] = np.where(log.rows, log.inputs.t, 0.0)
-    return signals
-
-
 def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
     """All families of forces that are looked at, over the motion as a fit sees it."""
     log = fitter.follower.log
-    signals = signals_of(fitter, fit)
+    signals = motion_of(fitter, fit)
     found = []
     for joint, site in enumerate(log.plant.joints):
         for name, values in signals.items():
@@ -92,8 +72,8 @@ def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
             if knots is not None:
                 found.append(Shape(joint, "force", name, knots, hats))
                 if name in _wearing(log.plant, joint):
-                    direction = _direction(signals[log.plant.rates[joint]], log.rows)
-                    found.append(Shape(joint, "friction", name, knots, -hats * direction))
+                    towards = direction(signals[log.plant.rates[joint]], log.rows)
+                    found.append(Shape(joint, "friction", name, knots, -hats * towards))
         if site in log.plant.actuated:
             command = signals[log.plant.commands[log.plant.actuated.index(site)]]
             knots, hats = _hats(signals["t"], log.rows)
@@ -109,23 +89,19 @@ def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
 
 def leftovers(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
     """What each family of forces would add to a fit, the most significant first."""
-    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
     white = fit.white.ravel()
     own = fit.jacobian[: white.size]
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
     left = white - basis @ (basis.T @ white)
     labels = np.repeat(stretches(fitter.follower.log)[:, None], fit.white.shape[1], axis=1).ravel()
-    found = [_tested(fitter, fit, gains, shape, basis, left, labels) for shape in shapes]
+    found = [_tested(fitter, fit, shape, basis, left, labels) for shape in shapes]
     return sorted(found, key=lambda leftover: leftover.p_value)
 
 
 def _tested(
-    fitter: Fitter, fit: Fit, gains: Gains, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
+    fitter: Fitter, fit: Fit, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
 ) -> Leftover:
-    log = fitter.follower.log
-    innovations = np.zeros((len(shape.columns), *fit.white.shape))
-    innovations[:, :, : len(log.channels)] = _answers(fitter.follower.linear, gains, shape, log)
-    slopes = whitened_change(innovations, fit.colour, log).reshape(len(shape.columns), -1).T
+    slopes = response(fitter, fit, shape.joint, shape.columns)
     slopes = slopes - basis @ (basis.T @ slopes)
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     scaled = slopes / size
@@ -141,59 +117,10 @@ def _tested(
     return Leftover(shape, gain, float(p_value), slopes)
 
 
-def _answers(linear: Linearisation, gains: Gains, shape: Shape, log: Log) -> np.ndarray:
-    """Change of the innovations by each force of a family, shape (C, R, m, K + 1)."""
-    return _driven(
-        linear.a,
-        linear.b[:, :, shape.joint].copy(),
-        linear.place,
-        log.intervals,
-        log.inputs.last,
-        log.channels,
-        gains.gains,
-        gains.whitening,
-        shape.columns,
-    )
-
-
-@cached
-def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
-    columns, rows, recordings = forces.shape
-    joints = a.shape[1]
-    n, m = 2 * joints, len(channels)
-    out = np.zeros((columns, recordings, m, rows))
-    transition, push = np.zeros((n, n)), np.zeros(n)
-    correction, show = np.eye(n), np.zeros((m, n))
-    for r in range(recordings):
-        states = np.zeros((n, columns))
-        for k in range(last[r] + 1):
-            for c in range(m):
-                show[:, channels[c]] = -whitening[k, r, :, c]
-                correction[:, channels[c]] = -gains[k, r, :, channels[c]]
-                correction[channels[c], channels[c]] += 1.0
-            shown = show @ states
-            for d in range(m):
-                out[:, r, d, k] = shown[d]
-            if k == last[r]:
-                break
-            dt, g = intervals[k, r], place[k, r]
-            transition_over(a[g], dt, transition)
-            for i in range(joints):
-                push[i], push[joints + i] = 0.5 * dt * dt * b[g, i], dt * b[g, i]
-            states = (transition @ correction) @ states + np.outer(push, forces[:, k, r])
-    return out
-
-
 def _wearing(plant: Plant, joint: int) -> tuple[str, ...]:
     """Signals over which the friction of a joint is looked at: its place, its load, time."""
     loads = [c for c, site in zip(plant.commands, plant.actuated, strict=True) if site == plant.joints[joint]]
     return (plant.coordinates[joint], *loads, "t")
-
-
-def _direction(rate: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Sign of a rate, without a jump where it is nearly at rest."""
-    slow = SLOW * max(float(np.quantile(np.abs(rate[rows]), ENDS[1])), 1e-12)
-    return rate / (np.abs(rate) + slow)
 
 
 def _hats(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray]:

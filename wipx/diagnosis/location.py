@@ -12,8 +12,8 @@ from wipx.core.diagnosis import ErrorMap, FoundEffect, Location, Period, Region
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.diagnosis.fitting import Fit, Fitter
-from wipx.diagnosis.leftover import signals_of
 from wipx.diagnosis.log import Log
+from wipx.diagnosis.response import motion_of
 
 BINS = 24  # of a map, along each axis
 RUN_BINS = 40  # along each recording
@@ -43,7 +43,7 @@ def located(
         return Location({}, (), (), None)
     excess = excess_of(fitter, nominal, completed)
     log = fitter.follower.log
-    signals = signals_of(fitter, nominal)
+    signals = motion_of(fitter, nominal)
     regions = _named_regions(effects, signals, excess, log) or _found_regions(signals, excess, log)
     return Location(_sites(effects, rest), regions, _periods(effects, excess, log), _map(log, signals, excess))
 

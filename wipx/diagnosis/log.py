@@ -83,14 +83,19 @@ class Log:
         """Time from each row to the next, shape (K, R) [s]; zero in the padding."""
         return np.where(self.rows[1:], np.diff(self.inputs.t, axis=0), 0.0)
 
-    @property
-    def command_spread(self) -> float:
-        """Half width by which single commands scatter about a row's mean, if they are noisy like the means [N or N m]."""
-        scaled = [
-            np.diff(r[name], 4) * np.sqrt(max(r.periods - 1, 0)) for r in self.recordings for name in self.plant.commands
-        ]
-        deviation = 1.4826 * float(np.median(np.abs(np.concatenate(scaled)))) / np.sqrt(70.0)
-        return max(np.sqrt(6.0) * deviation, 1e-9)  # a triangle is sqrt(6) standard deviations wide to either side
+    @cached_property
+    def command_spread(self) -> np.ndarray:
+        """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,).
+
+        The noise of the means is read off fourth differences; of n commands it is sqrt(n) times less than theirs, and
+        a triangular distribution is sqrt(6) standard deviations wide to either side.
+        """
+        found = []
+        for name in self.plant.commands:
+            scaled = [np.diff(r[name], 4) * np.sqrt(r.periods - 1) for r in self.recordings]
+            deviation = 1.4826 * float(np.median(np.abs(np.concatenate(scaled)))) / np.sqrt(70.0)
+            found.append(np.sqrt(6.0) * deviation)
+        return np.array(found)
 
     @cached_property
     def surprises(self) -> np.ndarray:

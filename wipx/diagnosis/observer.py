@@ -33,7 +33,8 @@ class NoiseLevels:
     Attributes:
         force: On each joint, shape (joints,), spectral [N s^0.5 or N m s^0.5].
         sensor: Of each recorded channel, shape (m,) [unit of the column].
-        spread: Half width by which single commands scatter about the mean that the log has [N or N m].
+        spread: Half width by which single commands scatter about the mean that the log has, in multiples of
+            `Log.command_spread`.
     """
 
     force: np.ndarray

@@ -15,6 +15,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Setting
+from wipx.diagnosis.places import SCANS
 from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
@@ -68,20 +69,17 @@ def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, 
 def doses(effect: Effect, scales: Scales) -> np.ndarray:
     """Values of an effect's parameters at which it is looked for, shape (atoms, parameters) [SI]."""
     axes = [[g * scales.of(p.dimension) for g in (p.grid or (p.start,))] for p in effect.parameters]
-    atoms = np.array(list(product(*axes)))
-    names = [p.name for p in effect.parameters]
-    if {"lo", "hi"} <= set(names):
-        atoms = atoms[atoms[:, names.index("lo")] < atoms[:, names.index("hi")]]
-    return atoms
+    return np.array(list(product(*axes)))
 
 
 def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Effect) -> list[Prospect]:
-    atoms = doses(effect, setting.scales[name.partition("/")[0]])
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
     base = fit.white.ravel()
     basis = _basis(fit.jacobian[: base.size])
     left = base - basis @ (basis.T @ base)
+    scan = SCANS.get(effect.kind)
+    atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else scan(fitter, fit, basis)
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
     low, high = _bounds(setting, name, effect)

@@ -24,7 +24,8 @@ LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 CONSIDERED = 6  # effects that are fitted in each step
 PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
-STARTS = 2  # of each effect
+LOOKED_AT = 8  # starts of each effect that are simulated
+STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 POLISHED = 3  # effects for which they are, at most
 WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
@@ -188,7 +189,7 @@ class Selection:
         return fit
 
     def exchanged(self, fit: Fit) -> Fit:
-        """Every effect replaced by a better one, as long as there is any."""
+        """Every effect replaced by a better one, or by itself at better values, as long as there is any."""
         for _ in range(EXCHANGES):
             best, most = fit, LEAST_LEAD
             for effect in fit.effects:
@@ -197,10 +198,10 @@ class Selection:
                 lead = -np.inf if found is None else self.score(found, base) - self.score(fit, base)
                 if found is not None and lead > most:
                     best, most = found, lead
-            best = self.pruned(best)
-            if best.effects == fit.effects:
+            if best is fit:
                 break
-            fit = best
+            self._fits[frozenset(best.effects)] = best
+            fit = self.pruned(best)
         return fit
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
@@ -223,7 +224,7 @@ class Selection:
         if not ranked or ranked[0].gain < WORTHLESS:
             return []
         leading = [name for name in by_effect if by_effect[name][0].gain >= max(PROMISING * ranked[0].gain, WORTHLESS)]
-        fits = [self._best_start(fit, by_effect[name][:STARTS]) for name in leading[:CONSIDERED]]
+        fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading[:CONSIDERED]]
         fits.sort(key=lambda f: -self.score(f, fit))
         gains = [self.evidence(fit, f) for f in fits]
         polished = []
@@ -236,12 +237,9 @@ class Selection:
 
     def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
         effects = (*fit.effects, starts[0].effect)
-        fits = [
-            self.fitter.fit(
-                Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start.values}), fit.levels, steps=5
-            )
-            for start in starts
-        ]
+        begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start.values}) for start in starts]
+        likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
+        fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
         return max(fits, key=lambda f: f.log_likelihood)
 
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:

@@ -64,16 +64,16 @@ def actuator_path(S, on, j):
             S[u + w] += S[R.OFFSET * W + w]
     if on[R.ON_DEAD_ZONE]:
         for w in range(W):
-            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w], S[R.SPREAD * W + w])
+            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w], S[(R.SPREAD + j) * W + w])
     for w in range(W):
         S[u + w] *= S[R.GAIN * W + w]
     if on[R.ON_SATURATION]:
         for w in range(W):
-            S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[R.SPREAD * W + w])
+            S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[(R.SPREAD + j) * W + w])
     if on[R.ON_SPEED_LIMIT]:
         for w in range(W):
             S[u + w] = speed_limit.limited(
-                S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w], S[R.SPREAD * W + w]
+                S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w], S[(R.SPREAD + j) * W + w]
             )
     if on[R.ON_BACK_EMF]:
         for w in range(W):
@@ -100,22 +100,22 @@ def actuator_path(S, on, j):
 def backlash(S, j):
     """Pass on the force of joint j where its drive is in contact."""
     for w in range(W):
-        h = S[R.STEP * W + w]
         force = S[(R.DRIVE + j) * W + w]
         gap = S[R.GAP * W + w]
         begun = S[R.STARTED * W + w] > 0.0
         before = S[(R.PLACE + j) * W + w] if begun else 0.5 * gap * sign(force)
-        moved, rate, share = backlash_law.cross(
+        place, speed, passed = backlash_law.cross(
             before,
             S[(R.DRIVE_SPEED + j) * W + w],
             force,
-            S[(R.ACCELERATION + j) * W + w],
+            S[(R.ACCELERATION + j) * W + w] - S[(R.MADE + j) * W + w],
+            S[(R.LIGHTNESS + j) * W + w],
             gap,
             S[R.DRIVE_INERTIA * W + w],
             S[R.DRIVE_DAMPING * W + w],
-            h,
+            S[R.RETURNED * W + w],
+            S[R.STEP * W + w],
         )
-        S[(R.PLACE + j) * W + w] = moved
-        S[(R.DRIVE_SPEED + j) * W + w] = rate
-        pushes = share if moved * force > 0.0 else 0.0
-        S[(R.DRIVE + j) * W + w] = force * (pushes if gap > 0.0 else 1.0)
+        S[(R.PLACE + j) * W + w] = place
+        S[(R.DRIVE_SPEED + j) * W + w] = speed
+        S[(R.DRIVE + j) * W + w] = passed if gap > 0.0 else force

@@ -35,7 +35,7 @@ class Observer:
         gains: Shape (groups, K + 1, R, 2 joints, 2 joints), from channels to states; zero where nothing
             was measured.
         group: Which of the gains each model has, shape (P,).
-        spread: Half width by which single commands scatter about the mean that the log has, shape (P,)
+        spread: Half width by which single commands scatter about the mean that the log has, shape (P, inputs)
             [N or N m]; thresholds of the actuator answer to single commands.
         reports: Whether to tell the forces of the drives.
     """
@@ -176,7 +176,9 @@ class _Run:
             ramps = self.layout.ramps()
             self.coefficients.present[R.ON_RAMP] = ramps is not HELD
         measured, corrections, group = self._observed(observer)
-        spread = np.zeros(self.batch.size) if observer is None else observer.spread
+        spread = np.zeros((2, self.batch.size))
+        if observer is not None:
+            spread[self.layout.driven] = observer.spread.T
 
         def work(begin: int, end: int) -> None:
             rollout(

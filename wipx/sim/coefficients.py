@@ -194,7 +194,7 @@ def _actuator(f: _Filler) -> None:
         (
             "actuator/backlash",
             R.ON_BACKLASH,
-            {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING},
+            {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING, "returned": R.RETURNED},
         ),
     ):
         _replace(f, name, flag, targets)

@@ -172,6 +172,12 @@ def move(S, on):
             last = S[(R.ACCELERATION + j) * W + w]
             S[(R.ACCELERATION + j) * W + w] = acceleration if S[R.STEP * W + w] > 0.0 else last
             S[(R.RATE + j) * W + w] = 0.5 * (before + after)
+        if on[R.ON_BACKLASH]:
+            for w in range(W):
+                if S[R.STEP * W + w] > 0.0:
+                    lightness = S[(R.W22 if j else R.W11) * W + w]
+                    S[(R.LIGHTNESS + j) * W + w] = lightness
+                    S[(R.MADE + j) * W + w] = lightness * S[(R.DRIVE + j) * W + w]
         if on[R.ON_BRISTLE + j]:
             for w in range(W):
                 z, mean = S[(R.Z + j) * W + w], S[(R.RATE + j) * W + w]

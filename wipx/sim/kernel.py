@@ -199,7 +199,7 @@ def rollout(
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, 2, lanes) if `per_lane` (written in closed loop), else (K, 2, R).
         ramps: Change of each command along a row, shape (K, 2, R); else (1, 2, 1).
-        spread: Half width of the single commands about their mean, shape (P,).
+        spread: Half width of each joint's single commands about their mean, shape (2, P).
         row_steps: Length of the steps from each row to the next, shape (K, R) [s].
         substeps: Their number, shape (K, R); 0 holds the state.
         per_lane: Whether every lane has commands of its own.
@@ -232,7 +232,8 @@ def rollout(
             lanes[0, w] = lane % windows
             lanes[1, w] = lane if per_lane else lane % windows
             pointers[w] = 0
-            S[R.SPREAD * W + w] = spread[lane // windows]
+            S[R.SPREAD * W + w] = spread[0, lane // windows]
+            S[R.SPREAD1 * W + w] = spread[1, lane // windows]
             for i in range(R.N_COEFFICIENTS):
                 S[i * W + w] = coefficients[i, lane // windows]
             for i in range(R.STATES):

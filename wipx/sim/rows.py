@@ -14,7 +14,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     ROTOR, ROTOR1,
     BALANCE, TILT, TILT_FORCE, SPRING, SPRING_REST,
     INPUT_GAIN, DELAY, OFFSET, DEAD_BAND, GAIN, FORCE_MAX, STALL, FREE_SPEED, BACK_EMF, LAG_RATE,
-    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING,
+    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING, RETURNED,
     VISCOUS, VISCOUS1, DRAG, DRAG1,
     LEVEL_PLUS, LEVEL_PLUS1, LEVEL_MINUS, LEVEL_MINUS1,
     STATIC, STATIC1, COULOMB, COULOMB1, STRIBECK_SPEED, STRIBECK_SPEED1,
@@ -30,7 +30,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     SMOOTHING, SMOOTHING1,  # speed over which dry friction builds up, 0 for sticking
     BIAS, BIAS1, SCALE, SCALE1, SENSOR_DELAY, SENSOR_DELAY1,
     N_COEFFICIENTS,
-) = range(122)  # fmt: skip
+) = range(123)  # fmt: skip
 
 # State of a rollout, carried from step to step.
 (
@@ -40,10 +40,11 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     PAPER, PAPER1,  # lagged friction
     LAGGED, LAGGED1,  # actuator
     PLACE, PLACE1, DRIVE_SPEED, DRIVE_SPEED1,  # backlash
+    MADE, MADE1, LIGHTNESS, LIGHTNESS1,  # accelerations in the last step: by the drive, and by a force of one
     SWING_PLACE, SWING_PLACE1, SWING_RATE, SWING_RATE1,
     STARTED,  # 0 before the first step, then 1
     N_STATES,
-) = range(N_COEFFICIENTS, N_COEFFICIENTS + 22)  # fmt: skip
+) = range(N_COEFFICIENTS, N_COEFFICIENTS + 26)  # fmt: skip
 
 # Scratch of one step.
 (
@@ -51,7 +52,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     LAG_KEPT, LAG_MEAN, PAPER_KEPT, PAPER_KEPT1, PAPER_MEAN, PAPER_MEAN1,  # of lags over one step
     MID, MID1, RATE, RATE1,  # coordinates and rates in mid-step
     COMMAND, COMMAND1, DRIVE, DRIVE1,  # command now, and the force that comes of it
-    SPREAD,  # half width of the single commands about their mean
+    SPREAD, SPREAD1,  # half width of the single commands about their mean
     RAMP, RAMP1, PHASE, PER_ROW,  # change of the command along the row, place in the row, one over its steps
     DELIVERED, DELIVERED1,  # integral of the drive's force over the row
     M11, M12, M22, COUPLING_NOW, GRAVITY_NOW,
@@ -63,7 +64,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 64)  # fmt: skip
+) = range(N_STATES, N_STATES + 65)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 
