@@ -1,6 +1,6 @@
 """Real-to-sim adaptation of balancing robots: identify, diagnose, estimate, control."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,10 @@ if TYPE_CHECKING:
 
 
 def diagnose(
-    recordings: "str | Path | Sequence[Recording]", robot: "str | Path | RobotDescription | None" = None
+    recordings: "str | Path | Sequence[Recording]",
+    robot: "str | Path | RobotDescription | None" = None,
+    *,
+    suspects: Mapping[str, Mapping[str, float]] | None = None,
 ) -> "Diagnosis":
     """Find out what physics a nominal model lacks.
 
@@ -23,10 +26,13 @@ def diagnose(
     Args:
         recordings: A folder of recordings, or recordings in SI.
         robot: The nominal model: a robot.yaml or what `read_robot` makes of one; None for the folder's own.
+        suspects: Effects to ask about once the answer is complete, which they leave as it is: by "site/kind", each
+            with the values that are suspected, by symbol [SI], or with none, e.g. {"pitch/coulomb": {"F_c": 0.29}}.
 
     Raises:
-        InputError: a file is missing or at fault, recordings are too short or contradict the model grossly.
+        InputError: a file is missing or at fault, a suspect cannot be, recordings are too short or contradict the
+            model grossly.
     """
     from wipx.library import diagnose_robot
 
-    return diagnose_robot(recordings, robot)
+    return diagnose_robot(recordings, robot, suspects)

@@ -1,6 +1,6 @@
 """The package as a library: functions of `wipx` itself, from files or objects, without a configuration."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,9 @@ from wipx.sim.simulator import StateFeedback
 
 
 def diagnose_robot(
-    recordings: str | Path | Sequence[Recording], robot: str | Path | RobotDescription | None
+    recordings: str | Path | Sequence[Recording],
+    robot: str | Path | RobotDescription | None,
+    suspects: Mapping[str, Mapping[str, float]] | None,
 ) -> Diagnosis:
     """See `wipx.diagnose`."""
     described = read_robot(Path(robot)) if isinstance(robot, str | Path) else robot
@@ -29,7 +31,7 @@ def diagnose_robot(
     if described is None:
         raise InputError("robot: recordings that come without a folder need a robot; give robot.yaml's path")
     known = Robot(described.model, described.uncertainty, feedback_of(described))
-    return diagnose(tuple(recordings), known, AnalyticSimulator(), title=title, source=where)
+    return diagnose(tuple(recordings), known, AnalyticSimulator(), title=title, source=where, suspects=suspects)
 
 
 def feedback_of(robot: RobotDescription) -> tuple[StateFeedback, float] | None:

@@ -63,9 +63,9 @@ class Bench:
         """These effects fitted from their usual values on."""
         return self.fitter.polished(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), self.quiet))
 
-    def diagnosed(self) -> Diagnosis:
-        """The answer."""
-        return diagnose(self.recordings, KnownRobot(self.nominal, self.uncertainty), SIMULATOR)
+    def diagnosed(self, suspects: Mapping[str, Mapping[str, float]] | None = None) -> Diagnosis:
+        """The answer, asked about suspects."""
+        return diagnose(self.recordings, KnownRobot(self.nominal, self.uncertainty), SIMULATOR, suspects=suspects)
 
 
 def recorded(kind: str, effects: Effects, seed: int, *, count: int = 2, duration: float = 3.0) -> Recordings:

@@ -40,6 +40,15 @@ def test_a_folder_and_its_objects_give_the_same_answer(axis: Path):
     assert content(wipx.diagnose(str(axis), str(axis / "robot.yaml"))) == content(from_folder)
 
 
+def test_suspects_are_answered(axis: Path):
+    (suspect,) = wipx.diagnose(axis, suspects={"translation/coulomb": {"F_c": 0.5}}).suspects
+    assert suspect.named
+    assert suspect.size is not None
+    assert not suspect.size.excluded
+    with pytest.raises(InputError, match="did you mean translation/coulomb"):
+        wipx.diagnose(axis, suspects={"translation/coulom": {}})
+
+
 def test_recordings_without_a_robot_are_refused(axis: Path):
     with pytest.raises(InputError, match=r"robot: .* give robot\.yaml's path"):
         wipx.diagnose(RecordingSource(path=str(axis)).load())

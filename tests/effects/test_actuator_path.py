@@ -221,7 +221,7 @@ def test_a_drive_that_returns_its_momentum_makes_the_motion_late_and_no_slower()
     loose = move(robot("linear_axis", {"actuator/backlash": law}, axis), (0.0, 0.0), T, commands)
     rigid = move(robot("linear_axis", {}, axis), (0.0, 0.0), T, commands)
     free = (mass - inertia) * inertia / mass  # drive and carriage part from each other with the reduced mass
-    crossed = T >= 0.1 + np.sqrt(2.0 * gap * free / 3.0) + 8e-3
+    crossed = 0.1 + np.sqrt(2.0 * gap * free / 3.0) + 8e-3 <= T
     np.testing.assert_allclose(loose.v[crossed, 0], rigid.v[crossed, 0], atol=1e-9)
     # The centre of mass moves as if rigid: the drive is a gap further back, so the carriage that much further ahead.
     ahead = loose.q[crossed, 0] - rigid.q[crossed, 0]

@@ -18,6 +18,8 @@ from wipx.core.diagnosis import (
     NextExperiment,
     Period,
     Region,
+    Suspect,
+    SuspectedSize,
     Unexplained,
 )
 from wipx.core.model import Model
@@ -91,6 +93,22 @@ def found_effects() -> tuple[FoundEffect, ...]:
         curve=None,
     )
     return coulomb, delay
+
+
+def suspects() -> tuple[Suspect, ...]:
+    """The named friction at a size that agrees, and one that is neither shown nor excluded."""
+    level = Estimate("translation/coulomb.F_c", "N", 0.0, 3.1042, 2.93, 3.29, False, "Coulomb level")
+    held = SuspectedSize({"F_c": 3.2}, 0.8, 0.8, True, 2.4, False, 1.02)
+    named = Suspect("translation/coulomb", True, (), (level,), 412.3, 14.2, 0.812, True, 0.0, held, "It agrees.")
+    drag = Estimate("pitch/viscous.sigma", "N m s/rad", 0.0, 0.002, 0.0, 0.011, False, "viscous friction")
+    held = SuspectedSize({"sigma": 0.05}, 230.0, 231.0, False, 2.1, True, 3.1)
+    absent = Suspect("pitch/viscous", False, (), (drag,), 0.6, 12.9, -0.01, False, -0.6, held, "It is excluded.")
+    return named, absent
+
+
+def asked() -> Diagnosis:
+    """The same answer, asked about suspects."""
+    return replace(mismatch(), suspects=suspects())
 
 
 def mismatch() -> Diagnosis:

@@ -18,7 +18,7 @@ CONTRACT = {
     "identifiability": {"weak", "next_experiment"},
 }
 ADDED = {
-    "": {"sentence", "source", "corrected", "bounds", "notes", "seconds"},
+    "": {"sentence", "source", "corrected", "bounds", "notes", "seconds", "suspects"},
     "effects": {"share", "beyond_vocabulary", "rivals"},
     "location": set(),
     "fit": set(),
@@ -59,6 +59,23 @@ def test_values_are_those_of_the_diagnosis(tmp_path):
     assert data["location"]["times"] == [{"low": 4.9, "high": 10.0, "share": 0.98, "recording": "r3.csv"}]
     assert data["corrected"]["body_inertia"]["nominal"] == 0.11
     assert data["identifiability"]["next_experiment"].startswith("Is it a delay or a lag of the actuator? Let")
+
+
+def test_suspects_are_written_with_all_their_numbers(tmp_path):
+    named, absent = written(synthetic_diagnosis.asked(), tmp_path)["suspects"]
+    assert named["named"]
+    assert named["parameters"] == {"F_c": {"value": 3.1042, "ci95": [2.93, 3.29], "unit": "N"}}
+    assert absent["sentence"] == "It is excluded."
+    assert absent["evidence"] == {"log_evidence_gain": 0.6, "needed": 12.9, "heldout_gain": -0.01, "transfers": False}
+    assert absent["suspected_size"] == {
+        "values": {"sigma": 0.05},
+        "loss": 230.0,
+        "loss_to_free": 231.0,
+        "against_free": False,
+        "limit": 2.1,
+        "excluded": True,
+        "heldout_error_ratio": 3.1,
+    }
 
 
 def test_a_consistent_robot_has_no_effects_and_no_next_experiment(tmp_path):

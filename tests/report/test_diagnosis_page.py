@@ -66,6 +66,14 @@ def test_page_of_a_mismatch_says_what_where_how_sure_and_what_next():
         assert part in text
 
 
+def test_what_was_asked_stands_behind_the_answer():
+    text = words(synthetic_diagnosis.asked())
+    assert "What was asked" not in words(synthetic_diagnosis.mismatch())
+    assert text.index("What was left out") < text.index("What was asked") < text.index("Recorded and predicted")
+    for part in ("3.10 N [2.93, 3.29]", "pitch/viscous", "It agrees.", "It is excluded."):
+        assert part in text[text.index("What was asked") :]
+
+
 def test_parts_stand_in_the_order_of_the_questions():
     text = words(synthetic_diagnosis.mismatch())
     titles = (

@@ -23,6 +23,11 @@ def test_summary_of_a_mismatch_holds_effects_ties_errors_and_the_next_experiment
         assert part in text
 
 
+def test_summary_answers_what_was_asked():
+    lines = summary(synthetic_diagnosis.asked()).splitlines()
+    assert [line for line in lines if line.startswith("asked: ")] == ["asked: It agrees.", "asked: It is excluded."]
+
+
 def test_summary_of_a_consistent_robot_is_short():
     text = summary(synthetic_diagnosis.consistent())
     assert "Consistent: nothing is missing" in text

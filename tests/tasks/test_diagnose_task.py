@@ -71,6 +71,35 @@ def test_an_axis_is_diagnosed_and_its_model_predicts(program, axis: Path, tmp_pa
     assert seen["rms"]["x"] < 0.1 * seen["rms_nominal"]["x"]
 
 
+def test_suspects_are_answered_in_all_results(program, axis: Path, tmp_path: Path):
+    suspects = "task.suspects={translation/coulomb: {F_c: 0.5}, actuator/delay: {}}"
+    answer = program("task=diagnose", suspects, f"recordings.path={axis}", "hydra.run.dir=out")
+    assert (answer.status, answer.error) == (0, "")
+    assert "asked: translation/coulomb: named" in answer.out
+    asked = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["suspects"]
+    assert [suspect["name"] for suspect in asked] == ["translation/coulomb", "actuator/delay"]
+    assert asked[0]["suspected_size"]["values"] == {"F_c": 0.5}
+    assert asked[1]["suspected_size"] is None
+    assert "What was asked" in (tmp_path / "out" / "report.html").read_text()
+
+
+SUSPECTS = {
+    "{translation/coulom: {}}": "did you mean translation/coulomb",
+    "{translation/coulomb: {F_s: 1}}": "unknown parameter 'F_s'",
+    "{translation/coulomb: {F_c: 1000000}}": "expected 0 to",
+    "{translation/coulomb: 1}": "task.suspects",
+}
+
+
+@pytest.mark.parametrize("suspects", SUSPECTS)
+def test_suspects_that_cannot_be_are_refused_in_one_line(program, axis: Path, tmp_path: Path, suspects: str):
+    answer = program("task=diagnose", f"task.suspects={suspects}", f"recordings.path={axis}", "hydra.run.dir=out")
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.error.count("\n") == 1, answer.error
+    assert SUSPECTS[suspects] in answer.error
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_page_needs_nothing_from_outside(program, axis: Path, tmp_path: Path):
     assert program("task=diagnose", f"recordings.path={axis}", "hydra.run.dir=out").status == 0
     page = (tmp_path / "out" / "report.html").read_text()

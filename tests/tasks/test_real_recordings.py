@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wipx.core.diagnosis import FoundEffect
+from wipx.core.diagnosis import FoundEffect, Suspect, SuspectedSize
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
+from wipx.core.results import Estimate
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.real_recordings import Case, only
-from wipx.tasks.real_table import HEAD, Outcome, cells, markdown, score
+from wipx.tasks.real_table import HEAD, Outcome, asked, cells, markdown, score
 
 RESULTS = {
     "authors.yaml",
@@ -45,6 +46,38 @@ def test_a_refusal_stays_in_the_table():
     assert cells(refused)[2] == "no answer: the recordings contradict its sign of u"
     head, rule, row = markdown([refused]).splitlines()
     assert head.count("|") == rule.count("|") == row.count("|") == len(HEAD) + 1
+
+
+def suspect(*, named: bool, gain: float, size: SuspectedSize | None, in_place_of: tuple[str, ...] = ()) -> Suspect:
+    level = Estimate("pitch/coulomb.F_c", "N m", 0.0, 0.21, 0.15, 0.27, False, "Coulomb level")
+    return Suspect("pitch/coulomb", named, in_place_of, (level,), gain, 43.0, 0.1, True, 0.0, size)
+
+
+def test_a_cell_says_what_came_of_the_authors_figure():
+    def size(loss: float, *, excluded: bool, free: bool) -> SuspectedSize:
+        return SuspectedSize({"F_c": 0.289}, loss, loss, free, 2.0, excluded, 3.1)
+
+    shown = "F_c = 0.21 N m [0.15, 0.27]"
+    agrees = suspect(named=True, gain=90.0, size=size(0.4, excluded=False, free=True))
+    assert asked(agrees) == f"pitch/coulomb: named, size agrees: 0.4 nats worse; {shown}"
+    excluded = suspect(named=False, gain=24.0, size=size(230.0, excluded=True, free=False))
+    assert asked(excluded) == f"pitch/coulomb: not named, excluded: 230 nats worse, held-out error 3.1 times; {shown}"
+    unknown = suspect(named=False, gain=24.0, size=size(1.3, excluded=False, free=False))
+    assert asked(unknown) == f"pitch/coulomb: not named, not excluded: 1.3 nats worse; {shown}"
+    instead = suspect(named=False, gain=24.0, size=None, in_place_of=("pitch/presliding",))
+    assert asked(instead) == f"pitch/coulomb in place of pitch/presliding: gains 24.0 nats of 43.0; {shown}"
+
+
+def test_known_effects_are_asked_about_at_the_authors_figures():
+    known = {"pitch/coulomb": "", "pitch/viscous": "", "actuator/delay": ""}
+    authors = {"effects": {"pitch/coulomb": {"F_c": 0.3}, "pitch/viscous": {"sigma": 0.1}}}
+    case = Case("rig", known, authors=authors, figures={"pitch/viscous": {"sigma": 0.2}})
+    assert case.suspects == {"pitch/coulomb": {"F_c": 0.3}, "pitch/viscous": {"sigma": 0.2}, "actuator/delay": {}}
+
+
+def test_a_figure_of_an_effect_that_is_not_known_is_refused():
+    with pytest.raises(InputError, match=r"figures: unknown effect .* did you mean pitch/coulomb"):
+        Case("rig", {"pitch/coulomb": ""}, figures={"pitch/coulom": {"F_c": 0.3}})
 
 
 def pendulum() -> Model:

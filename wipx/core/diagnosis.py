@@ -250,6 +250,66 @@ class NextExperiment:
 
 
 @dataclass(frozen=True)
+class SuspectedSize:
+    """A suspect held at the size that was suspected, everything else fitted anew.
+
+    Attributes:
+        values: What was suspected, by symbol [SI].
+        loss: Nats by which the answer is better; negative where the answer is worse.
+        loss_to_free: Nats by which the same effect with a free size is better.
+        against_free: Whether the free size decides: the answer names the effect or has another in its place, or the
+            effect gains enough to be named; else the answer without the effect decides.
+        limit: Nats of loss, to the one that decides, from which the size is excluded.
+        excluded: Whether the recordings exclude the size, by 95 %.
+        error_ratio: Prediction error on recordings it was not fitted to, over that of the answer.
+    """
+
+    values: Mapping[str, float]
+    loss: float
+    loss_to_free: float
+    against_free: bool
+    limit: float
+    excluded: bool
+    error_ratio: float
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An effect that a person asked about, beside the effects of the answer.
+
+    Attributes:
+        name: "site/kind".
+        named: Whether the answer names it.
+        in_place_of: Effects of the answer in whose place it was fitted: they cannot stand beside it.
+        parameters: Its numbers, if they are free, with 95 % intervals.
+        log_evidence_gain: Log-likelihood that it adds then to the other effects, in nats.
+        needed: Nats that it needs to be named.
+        heldout_gain: Share of the squared prediction error on recordings it was not fitted to that it removes then.
+        transfers: Whether it makes recordings likelier that it was not fitted to.
+        loss: Nats by which the answer is better than with this effect; zero or less unless it is `in_place_of` others.
+        size: What comes of the suspected size; None where none was given.
+        sentence: All of it in words.
+    """
+
+    name: str
+    named: bool
+    in_place_of: tuple[str, ...]
+    parameters: tuple[Estimate, ...]
+    log_evidence_gain: float
+    needed: float
+    heldout_gain: float
+    transfers: bool
+    loss: float
+    size: SuspectedSize | None
+    sentence: str = ""
+
+    @property
+    def supported(self) -> bool:
+        """Whether the recordings speak for the effect: it is named, or gains what it needs."""
+        return self.named or self.log_evidence_gain >= self.needed
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The answer: is physics missing, where, which, how much, and what is still open.
 
@@ -274,6 +334,7 @@ class Diagnosis:
         traces: Recordings beside predictions, held-out ones first.
         notes: Warnings a reader must know, one sentence each.
         seconds: That the diagnosis took.
+        suspects: What was asked about after the answer was complete, and what these recordings say of it.
     """
 
     title: str
@@ -296,3 +357,4 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     notes: tuple[str, ...]
     seconds: float
+    suspects: tuple[Suspect, ...] = ()

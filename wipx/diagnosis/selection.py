@@ -108,12 +108,16 @@ class Selection:
 
     def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
+        return self.evidence(smaller, larger) >= self.needed(smaller, larger)
+
+    def needed(self, smaller: Fit, larger: Fit) -> float:
+        """Evidence that the effects which `larger` has beside those of `smaller` must gain [nats]."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
-        evidence = self.evidence(smaller, larger) / inflation(larger, self.fitter.follower.log, indices)
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
-        return evidence - penalty >= max(LEAST_GAIN, LEAST_SHARE * explained)
+        overstated = inflation(larger, self.fitter.follower.log, indices)
+        return float(overstated * (penalty + max(LEAST_GAIN, LEAST_SHARE * explained)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""

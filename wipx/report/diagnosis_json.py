@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect, Location, Unexplained
+from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect, Location, Suspect, SuspectedSize, Unexplained
 from wipx.core.results import Estimate, FitErrors
 from wipx.report.diagnosis_words import next_step, symbol_of
 
@@ -28,6 +28,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
         },
         "unexplained": _unexplained(diagnosis.unexplained),
         "bounds": [_bound(bound) for bound in diagnosis.bounds],
+        "suspects": [_suspect(suspect) for suspect in diagnosis.suspects],
         "identifiability": {"weak": list(diagnosis.weak), "next_experiment": next_step(diagnosis.next_experiment)},
         "notes": list(diagnosis.notes),
         "seconds": float(diagnosis.seconds),
@@ -91,6 +92,36 @@ def _unexplained(left: Unexplained) -> dict[str, object]:
 
 def _bound(bound: Bound) -> dict[str, object]:
     return {"name": bound.name, "ci95": [float(bound.low), float(bound.high)], "unit": bound.unit}
+
+
+def _suspect(suspect: Suspect) -> dict[str, object]:
+    return {
+        "name": suspect.name,
+        "sentence": suspect.sentence,
+        "named": suspect.named,
+        "in_place_of": list(suspect.in_place_of),
+        "parameters": {symbol_of(number.name): _value(number) for number in suspect.parameters},
+        "evidence": {
+            "log_evidence_gain": float(suspect.log_evidence_gain),
+            "needed": float(suspect.needed),
+            "heldout_gain": float(suspect.heldout_gain),
+            "transfers": suspect.transfers,
+        },
+        "loss": float(suspect.loss),
+        "suspected_size": None if suspect.size is None else _suspected_size(suspect.size),
+    }
+
+
+def _suspected_size(size: SuspectedSize) -> dict[str, object]:
+    return {
+        "values": _floats(size.values),
+        "loss": float(size.loss),
+        "loss_to_free": float(size.loss_to_free),
+        "against_free": size.against_free,
+        "limit": float(size.limit),
+        "excluded": size.excluded,
+        "heldout_error_ratio": float(size.error_ratio),
+    }
 
 
 def _floats(values: Mapping[str, float]) -> dict[str, float]:

@@ -5,7 +5,15 @@ from pathlib import Path
 from wipx.core.diagnosis import Diagnosis
 from wipx.report.charts import shown_traces
 from wipx.report.diagnosis_charts import MOST_RUNS, diagnosis_data, titled_curves
-from wipx.report.diagnosis_rows import bound_rows, candidate_bars, effect_rows, menu_bars, model_rows, site_bars
+from wipx.report.diagnosis_rows import (
+    bound_rows,
+    candidate_bars,
+    effect_rows,
+    menu_bars,
+    model_rows,
+    site_bars,
+    suspect_rows,
+)
 from wipx.report.diagnosis_words import PLANTS, VERDICTS, period_sentence, region_sentence, unexplained_sentence
 from wipx.report.estimates import marked_rows
 from wipx.report.files import write_whole
@@ -46,6 +54,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             "traces": shown,
             "omitted": len(diagnosis.traces) - len(shown),
             "effects": effect_rows(diagnosis),
+            "suspects": suspect_rows(diagnosis),
             "sites": site_bars(diagnosis),
             "places": [
                 *(region_sentence(region, diagnosis.units) for region in location.regions),

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from wipx.core.diagnosis import Candidate, Diagnosis
+from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report import diagnosis_words as words
 from wipx.report.diagnosis_charts import bar_length, full_bar, ranked_candidates
@@ -105,6 +106,31 @@ class EffectRow:
 
 
 @dataclass(frozen=True)
+class SuspectRow:
+    """What was asked about, ready to print.
+
+    Attributes:
+        words: In words.
+        name: "site/kind".
+        named: Whether the answer names it.
+        numbers: Its parameters, if they are free.
+        evidence: Nats that it adds then.
+        needed: Nats that it needs to be named.
+        heldout_gain: Per cent.
+        sentence: What the recordings say of it.
+    """
+
+    words: str
+    name: str
+    named: bool
+    numbers: tuple[NumberRow, ...]
+    evidence: str
+    needed: str
+    heldout_gain: str
+    sentence: str
+
+
+@dataclass(frozen=True)
 class BoundRow:
     """How large an absent effect could be, ready to print.
 
@@ -150,17 +176,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[EffectRow]:
             law=effect.law,
             source=effect.source,
             beyond=effect.beyond,
-            numbers=tuple(
-                NumberRow(
-                    symbol=words.symbol_of(number.name),
-                    value=words.shown_value(number),
-                    unit=_unit(number.unit),
-                    interval=words.shown_interval(number),
-                    meaning=number.meaning,
-                    at_bound=number.at_bound,
-                )
-                for number in effect.parameters
-            ),
+            numbers=tuple(map(_number_row, effect.parameters)),
             evidence=words.nats(effect.log_evidence_gain),
             heldout_gain=words.percent(effect.heldout_gain),
             probability=words.probability(effect.present_probability),
@@ -178,6 +194,35 @@ def effect_rows(diagnosis: Diagnosis) -> list[EffectRow]:
             ),
         )
         for effect in diagnosis.effects
+    ]
+
+
+def _number_row(number: Estimate) -> NumberRow:
+    return NumberRow(
+        symbol=words.symbol_of(number.name),
+        value=words.shown_value(number),
+        unit=_unit(number.unit),
+        interval=words.shown_interval(number),
+        meaning=number.meaning,
+        at_bound=number.at_bound,
+    )
+
+
+def suspect_rows(diagnosis: Diagnosis) -> list[SuspectRow]:
+    """What was asked about, in the order of the questions."""
+    kind = diagnosis.model.plant.kind
+    return [
+        SuspectRow(
+            words=words.capitalised(effect_in_words(suspect.name, kind)),
+            name=suspect.name,
+            named=suspect.named,
+            numbers=tuple(map(_number_row, suspect.parameters)),
+            evidence=words.nats(suspect.log_evidence_gain),
+            needed=words.nats(suspect.needed),
+            heldout_gain=words.percent(suspect.heldout_gain),
+            sentence=suspect.sentence,
+        )
+        for suspect in diagnosis.suspects
     ]
 
 

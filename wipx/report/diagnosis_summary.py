@@ -25,6 +25,7 @@ def summary(diagnosis: Diagnosis) -> str:
         corrected = ", ".join(value_in_words(number) for number in diagnosis.corrected)
         lines.append(f"  corrected: {corrected}")
     lines += [headline(diagnosis), unexplained_sentence(diagnosis)]
+    lines += [f"asked: {suspect.sentence}" for suspect in diagnosis.suspects]
     following = next_step(diagnosis.next_experiment)
     if following is not None:
         lines.append(f"next: {following}")

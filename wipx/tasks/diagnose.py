@@ -25,9 +25,12 @@ class Diagnose:
 
     Attributes:
         lead: Time before a prediction from which its state is estimated [s].
+        suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
+            suspected, by symbol [SI], or with none; None for no questions.
     """
 
     lead: float = 0.3
+    suspects: dict[str, dict[str, float]] | None = None
 
     def __post_init__(self) -> None:
         check_positive(lead=self.lead)
@@ -58,6 +61,7 @@ class Diagnose:
                 lead=self.lead,
                 rng=np.random.default_rng(job.seed),
                 watcher=progress,
+                suspects=self.suspects,
             )
         with written_together(job.out) as folder:
             write_diagnosis(diagnosis, folder)

@@ -1,8 +1,9 @@
 """`task=real_recordings`: what the diagnosis finds, blind, on recordings of real hardware, as one table.
 
 Each case is a dataset, what its authors know of the physics that their nominal model lacks, and their model with
-that physics. The diagnosis sees neither, nor the held-out recordings, on which the nominal, the completed and the
-authors' model are compared. A case leaves a folder like that of `task=diagnose`.
+that physics. The diagnosis sees neither before its answer is complete; then it is asked about the authors' figures.
+It never sees the held-out recordings, on which the nominal, the completed and the authors' model are compared. A case
+leaves a folder like that of `task=diagnose`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,9 +17,11 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.model import Model
 from wipx.core.recording import Recording, RecordingSplit
-from wipx.diagnosis.case import HORIZON
+from wipx.diagnosis.inquiry import HORIZON
+from wipx.diagnosis.suspects import check_suspects
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
+from wipx.identify.parameter_space import scales_of
 from wipx.recordings.model_file import check_keys, mapping_of, model_from_mapping, write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.diagnose import Diagnose
@@ -36,6 +39,7 @@ class Case:
         known: What the authors found missing, by "site/kind", with the figure that they give, in words.
         authors: Their full model: `parameters` and `effects` that replace or join those of the nominal one, as in
             robot.yaml; empty where they published none.
+        figures: Their figures of known effects, by symbol [SI], where `authors` has none.
         spans: Parts of recordings to use instead of the dataset's, as in `RecordingSource`.
         uncertainty: Relative standard deviation of further nominal numbers that are not exact.
         horizons: Lengths of the predictions by which models are judged [s].
@@ -45,6 +49,7 @@ class Case:
     dataset: str
     known: dict[str, str]
     authors: dict[str, dict[str, Any]] = field(default_factory=dict)
+    figures: dict[str, dict[str, float]] = field(default_factory=dict)
     spans: dict[str, list[float | None]] = field(default_factory=dict)
     uncertainty: dict[str, float] = field(default_factory=dict)
     horizons: tuple[float, ...] = (HORIZON,)
@@ -54,6 +59,9 @@ class Case:
         for horizon in self.horizons:
             check_positive(horizons=horizon)
         check_positive(lead=self.lead)
+        for name in self.figures:
+            if name not in self.known:
+                raise unknown_name("effect", name, self.known, "task.cases: figures")
 
     def of(self, source: RecordingSource) -> RecordingSource:
         """A dataset with the case's own choices."""
@@ -61,6 +69,12 @@ class Case:
         if robot is not None and self.uncertainty:
             robot = {**robot, "uncertainty": {**robot.get("uncertainty", {}), **self.uncertainty}}
         return replace(source, robot=robot, spans=self.spans or source.spans)
+
+    @property
+    def suspects(self) -> dict[str, dict[str, float]]:
+        """The known effects with the authors' figures [SI]; without any where they give none."""
+        published = {**self.authors.get("effects", {}), **self.figures}
+        return {name: published.get(name, {}) for name in self.known}
 
     def authors_model(self, nominal: Model, where: str) -> Model | None:
         """The authors' full model; None where they published none.
@@ -139,8 +153,11 @@ class RealRecordings:
         prepared = {}
         for name, case in cases.items():
             source = sources[name]
-            authors = case.authors_model(source.describe().model, f"task.cases.{name}.authors")
-            prepared[name] = Prepared(case, source, source.split(source.load()), authors)
+            where, nominal, recordings = f"task.cases.{name}", source.describe().model, source.load()
+            authors = case.authors_model(nominal, f"{where}.authors")
+            split = source.split(recordings)
+            check_suspects(case.suspects, nominal, scales_of(nominal, split.fit), f"{where}.known")
+            prepared[name] = Prepared(case, source, split, authors)
         return prepared
 
     def _source(self, job: Job, dataset: str) -> RecordingSource:
@@ -171,7 +188,7 @@ def outcome_of(job: Job, prepared: Prepared) -> Outcome:
     """
     case, source, split = prepared.case, prepared.source, prepared.split
     try:
-        diagnosis = Diagnose(case.lead).of(job, only(source, split.fit))
+        diagnosis = Diagnose(case.lead, case.suspects).of(job, only(source, split.fit))
     except InputError as refusal:
         print(f"refused: {refusal}")
         return Outcome(source.name, case.known, None, (), str(refusal))

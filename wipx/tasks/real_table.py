@@ -3,15 +3,16 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from wipx.core.diagnosis import Diagnosis, FoundEffect
-from wipx.report.diagnosis_words import value_in_words
-from wipx.report.numbers import compact
+from wipx.core.diagnosis import Diagnosis, FoundEffect, Suspect
+from wipx.report.diagnosis_words import nats, value_in_words
+from wipx.report.numbers import compact, significant
 
 HEAD = (
     "recordings",
     "the authors found",
     "found blind",
     "known effects named",
+    "asked about the authors' figures",
     "verdict",
     "horizon",
     "error before",
@@ -76,6 +77,7 @@ def cells(outcome: Outcome) -> tuple[str, ...]:
         known,
         _stacked(map(_shown, effects)) or "nothing",
         score(outcome.known, effects),
+        _stacked(map(asked, outcome.diagnosis.suspects)),
         outcome.diagnosis.verdict,
         _stacked(f"{e.horizon:g} s" for e in outcome.errors),
         _stacked(_in_units(e.nominal, units) for e in outcome.errors),
@@ -95,6 +97,23 @@ def score(known: Mapping[str, str], found: tuple[FoundEffect, ...]) -> str:
     if names - known.keys():
         counts.append(f"{len(names - known.keys())} beside")
     return ", ".join(counts)
+
+
+def asked(suspect: Suspect) -> str:
+    """What came of a known effect: its free size, and of the authors' figure."""
+    values = ", ".join(value_in_words(number) for number in suspect.parameters)
+    others = f" in place of {' and '.join(suspect.in_place_of)}" if suspect.in_place_of else ""
+    evidence = f"gains {nats(suspect.log_evidence_gain)} nats of {nats(suspect.needed)}"
+    named = "named" if suspect.named else evidence if suspect.supported else "not named"
+    if suspect.size is None:
+        return f"{suspect.name}{others}: {'named' if suspect.named else evidence}; {values}"
+    loss = suspect.size.loss_to_free if suspect.size.against_free else suspect.size.loss
+    apart = f"{nats(abs(loss))} nats {'worse' if loss >= 0.0 else 'better'}"
+    if suspect.size.excluded:
+        found = f"excluded: {apart}, held-out error {significant(suspect.size.error_ratio, 2)} times"
+    else:
+        found = f"size agrees: {apart}" if suspect.supported else f"not excluded: {apart}"
+    return f"{suspect.name}{others}: {named}, {found}; {values}"
 
 
 def _shown(effect: FoundEffect) -> str:

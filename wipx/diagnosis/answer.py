@@ -1,0 +1,198 @@
+"""The answer put together: effects with numbers and rivals, what is unexplained or weak, and what to record next."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from wipx.core.diagnosis import Alternative, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
+from wipx.core.results import Estimate
+from wipx.core.words import effect_in_words
+from wipx.diagnosis.curves import law_curve
+from wipx.diagnosis.decision import Rest
+from wipx.diagnosis.experiment import Question, next_experiment
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.heldout import Transfer, judged, transfer
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.leftover import Shape
+from wipx.diagnosis.location import located
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.nested import CONTAINS, simpler
+from wipx.diagnosis.numbers import bounds, estimates, is_wide
+from wipx.diagnosis.robust import inflation
+from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.sentence import sentence
+from wipx.diagnosis.stand_in import curve_of
+from wipx.effects.catalogue import effect_of
+from wipx.sim.simulator import StateFeedback
+
+ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
+CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
+
+
+def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
+    """Everything a person wants to know."""
+    nominal, fit = inquiry.setting.nominal, rest.fit
+    repeated = transfer(inquiry.fitter, fit)
+    held_out, traces = judged(inquiry.judge, nominal, repeated.models, inquiry.recordings)
+    fitted, _ = inquiry.judge.compare(nominal, fit.hypothesis.model, inquiry.recordings, held_out=False)
+    ends = estimates(inquiry.fitter, fit, selection.nominal)
+    effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
+    verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
+    unexplained = _unexplained(inquiry, rest)
+    location = located(inquiry.fitter, selection.nominal, fit, effects, unexplained.site)
+    draft = Diagnosis(
+        title="",
+        source="",
+        units=_units(inquiry),
+        verdict=verdict,
+        sentence="",
+        nominal=nominal,
+        model=fit.hypothesis.model,
+        effects=effects,
+        corrected=tuple(e for e in ends if e.name in inquiry.setting.uncertainty),
+        location=location,
+        fit=fitted,
+        held_out=held_out,
+        unexplained=unexplained,
+        candidates=tuple(selection.considered),
+        bounds=bounds(selection.prospects_of(fit), inquiry.log.plant),
+        weak=_weak(effects),
+        next_experiment=None,
+        traces=traces,
+        notes=(),
+        seconds=0.0,
+    )
+    return replace(draft, sentence=sentence(draft))
+
+
+def _effects(
+    inquiry: Inquiry,
+    selection: Selection,
+    rest: Rest,
+    repeated: Transfer,
+    ends: tuple[Estimate, ...],
+    shapes: list[Shape],
+) -> tuple[FoundEffect, ...]:
+    fit = rest.fit
+    reduced = {effect: inquiry.reduced(selection, fit, effect) for effect in fit.effects}
+    gains = {effect: max(selection.evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
+    total = sum(gains.values()) or 1.0
+    found = []
+    for effect in sorted(fit.effects, key=lambda e: -gains[e]):
+        law = effect_of(effect, inquiry.log.plant)
+        rivals, probability = _rivals(inquiry, selection, fit, effect)
+        found.append(
+            FoundEffect(
+                effect,
+                law.law,
+                law.source,
+                law.beyond,
+                tuple(e for e in ends if e.name.startswith(f"{effect}.")),
+                tuple(rival.name for rival in rivals if rival.separation < ALIKE),
+                rivals,
+                gains[effect],
+                inquiry.heldout_gain(repeated, reduced[effect]),
+                probability,
+                gains[effect] / total,
+                law_curve(inquiry.fitter, _taken_out(inquiry, fit, effect), fit, effect, shapes),
+            )
+        )
+    return tuple(found)
+
+
+def _taken_out(inquiry: Inquiry, fit: Fit, effect: str) -> Fit:
+    """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
+    rest = tuple(e for e in fit.effects if e != effect)
+    hypothesis = Hypothesis.of(inquiry.setting_of(fit), rest, fit.hypothesis.values)
+    found = inquiry.fitter.fit(hypothesis, fit.levels, steps=0)
+    return replace(found, jacobian=found.jacobian[:, :0])
+
+
+def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
+    """Effects that could stand in the place of one, the closest first, and the probability of its name."""
+    overstated = inflation(fit, inquiry.log, fit.hypothesis.parameters_of(effect))
+    rivals, weights = [], []
+    rest = set(fit.effects) - {effect}
+    base = selection.without(fit, effect)
+    for other in selection.replacements(fit, effect):
+        name = next(iter(set(other.effects) - rest), effect)
+        if name == effect or _is_richer(other, name, effect, inquiry.log):
+            continue
+        if selection.evidence(base, fit) - selection.evidence(base, other) < CLOSE_CALL:
+            again = inquiry.fitter.polished(inquiry.fitter.fit(other.hypothesis, fit.levels))
+            other = max(other, again, key=lambda found: found.log_likelihood)
+        loss = selection.evidence(base, fit) - selection.evidence(base, other)
+        values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
+        rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
+        weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
+    rivals.sort(key=lambda rival: rival.separation)
+    return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
+
+
+def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
+    """Whether a rival is the same law with more to it that is not needed."""
+    contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
+    replaced = simpler(other, log)
+    return contained == effect or (replaced is not None and effect in replaced)
+
+
+def _unexplained(inquiry: Inquiry, rest: Rest) -> Unexplained:
+    beyond = [name for name in rest.fit.effects if effect_of(name, inquiry.log.plant).beyond]
+    if rest.significant and beyond:
+        words = " and ".join(effect_in_words(name, inquiry.log.plant.kind) for name in beyond)
+        return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
+    if not rest.significant or rest.strongest is None:
+        return Unexplained(False, rest.p_value, None, "", (), None)
+    shape = rest.strongest.shape
+    site = inquiry.log.plant.joints[shape.joint]
+    words = {
+        "force": f"a force over {shape.signal} on {site}",
+        "gain": "an actuator gain that drifts over time",
+        "friction": f"dry friction on {site} that changes with {shape.signal}",
+        "resonance": f"something that swings with {site} at about {shape.signal} Hz",
+    }[shape.kind]
+    curve = curve_of(shape, rest.fit, rest.spread, inquiry.log) if len(rest.spread) else None
+    return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
+
+
+def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
+    found = []
+    for effect in effects:
+        for p in effect.parameters:
+            if is_wide(p):
+                found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
+        for name in effect.equivalent:
+            found.append(f"{effect.name} cannot be told from {name}")
+    return tuple(found)
+
+
+def _units(inquiry: Inquiry) -> dict[str, str]:
+    plant = inquiry.log.plant
+    return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
+
+
+def proposed(
+    inquiry: Inquiry,
+    selection: Selection,
+    fit: Fit,
+    answer: Diagnosis,
+    feedback: tuple[StateFeedback, float] | None,
+    rng: np.random.Generator,
+) -> NextExperiment | None:
+    """The experiment that settles what is tied or weak; None where nothing is."""
+    tied = [(effect.name, name) for effect in answer.effects for name in effect.equivalent]
+    rivals = [
+        other
+        for effect, name in tied
+        for other in selection.replacements(fit, effect)
+        if name in other.effects and effect not in other.effects
+    ]
+    weak = tuple(p.name for effect in answer.effects for p in effect.parameters if is_wide(p))
+    if not rivals and not weak:
+        return None
+    questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
+    question = Question(f"Open: {', '.join(questions)}.", tuple(rivals), weak)
+    closed, rate = feedback if feedback is not None else (None, inquiry.recordings[0].rate)
+    simulator = inquiry.fitter.follower.simulator
+    return next_experiment(question, fit, inquiry.setting, inquiry.log, simulator, closed, rate, rng)

@@ -1,0 +1,136 @@
+"""What becomes of the effects that the selection chose: which are kept, and what stands in for what they leave over."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.core.diagnosis import Candidate
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.heldout import row_likelihoods, transfer
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.leftover import Leftover, Shape, leftovers
+from wipx.diagnosis.nested import CONTAINS
+from wipx.diagnosis.screening import prospects
+from wipx.diagnosis.selection import LEAST_GAIN, Selection
+from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
+from wipx.diagnosis.stand_in import with_curve
+
+SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
+LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
+LEFTOVER_SHARE = 0.02  # and of what is explained
+BESIDE_MEANS = 3.0  # times as much where a threshold acts on commands of which the log has means only
+DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
+IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The final fit and what it leaves over.
+
+    Attributes:
+        fit: Of the effects that are kept, and of a curve that stands in for the rest where there is one.
+        strongest: What is left over; None where nothing significant is.
+        p_value: That it is nothing, corrected for the number of places looked at.
+        significant: Whether it is something.
+        resembles: Effects beyond the vocabulary that would explain it.
+        spread: Standard deviation of the stand-in at its knots [force or share]; empty where there is none.
+    """
+
+    fit: Fit
+    strongest: Leftover | None
+    p_value: float
+    significant: bool
+    resembles: tuple[str, ...]
+    spread: np.ndarray
+
+
+def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
+    """Without effects that change no prediction to speak of, or do not transfer to held-out recordings."""
+    if not fit.effects:
+        return fit
+    repeated = transfer(inquiry.fitter, fit)
+    with_it = inquiry.judge.predict(fit.hypothesis.model, inquiry.recordings)
+    for effect in reversed(fit.effects):
+        rest = tuple(e for e in fit.effects if e != effect)
+        reduced = selection.fitted(rest, fit) if rest else selection.nominal
+        without = inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings)
+        change = np.concatenate(with_it) - np.concatenate(without)
+        irrelevant = bool(np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise))
+        known = row_likelihoods(inquiry.fitter, reduced, reduced.white).sum(axis=1)
+        gain = selection.evidence(reduced, fit)
+        # An effect that gains much and does not transfer points to something else that is missing.
+        lost = float(np.sum(repeated.likelihoods - known)) <= 0.0 and gain < DOUBTFUL
+        if irrelevant or lost:
+            reason = "changes no prediction to speak of" if irrelevant else "does not transfer to held-out recordings"
+            selection.considered.append(Candidate(effect, gain, False, reason))
+            plain = _with_simple_law(selection, fit, effect)
+            worth = plain is not None and selection.worthwhile(reduced, plain)
+            return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
+    return fit
+
+
+def _with_simple_law(selection: Selection, fit: Fit, effect: str) -> Fit | None:
+    """The fit with the simple law that an effect contains in its place; None where it contains none."""
+    site, _, kind = effect.partition("/")
+    simple = f"{site}/{CONTAINS.get(kind)}"
+    if kind not in CONTAINS or simple in fit.effects:
+        return None
+    return selection.fitted((*(e for e in fit.effects if e != effect), simple), fit)
+
+
+def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
+    """What the named effects leave over, and a stand-in for it."""
+    found = leftovers(inquiry.fitter, fit, shapes)
+    strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < SIGNIFICANT else 0.0)
+    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
+    explained = fit.motion_likelihood - selection.nominal.motion_likelihood
+    worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained) * (BESIDE_MEANS if fit.levels.spread > 0.0 else 1.0)
+    significant = p_value < SIGNIFICANT and strongest.gain >= worth
+    if not significant and not _is_far_off(inquiry, fit):
+        return Rest(fit, None, p_value, False, (), np.zeros(0))
+    resembles, named = _beyond(inquiry, selection, fit, worth)
+    if not significant:
+        return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
+    forces = [leftover for leftover in found if leftover.shape.kind != "resonance"]
+    widest = max(forces, key=lambda leftover: leftover.gain)
+    stood_in, spread = with_curve(inquiry.fitter, inquiry.setting, fit, widest)
+    if named is not None and named.log_likelihood > stood_in.log_likelihood:
+        named = _without_superfluous(inquiry, selection, named)
+        return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
+    for effect in fit.effects:
+        if selection.evidence(inquiry.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
+            return remaining(inquiry, selection, selection.without(fit, effect), shapes)
+    return Rest(stood_in, widest, p_value, True, resembles, spread)
+
+
+def _beyond(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
+    """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
+    ranked = prospects(inquiry.fitter, inquiry.setting, fit, beyond=True)
+    best: dict[str, Fit] = {}
+    for prospect in ranked:
+        if prospect.gain < 0.3 * ranked[0].gain or prospect.gain < 0.3 * worth or len(best) == 3:
+            break
+        if prospect.effect not in best:
+            values = {**fit.hypothesis.values, **prospect.values}
+            hypothesis = Hypothesis.of(inquiry.setting, (*fit.effects, prospect.effect), values)
+            best[prospect.effect] = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, fit.levels), rounds=2)
+    good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
+    ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
+    return tuple(ordered), good[ordered[0]] if ordered else None
+
+
+def _is_far_off(inquiry: Inquiry, fit: Fit) -> bool:
+    """Whether predictions are much worse than sensor noise makes them."""
+    errors, _ = inquiry.judge.compare(inquiry.setting.nominal, fit.hypothesis.model, inquiry.recordings, held_out=False)
+    return times_the_floor(errors) > FAR_OFF
+
+
+def _without_superfluous(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
+    """Without effects that one from beyond the vocabulary has made superfluous."""
+    for effect in fit.effects[:-1]:
+        rest = tuple(e for e in fit.effects if e != effect)
+        smaller = selection.fitted(rest, fit)
+        if not selection.worthwhile(smaller, fit):
+            return _without_superfluous(inquiry, selection, smaller)
+    return fit

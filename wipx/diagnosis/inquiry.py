@@ -1,0 +1,110 @@
+"""What all stages of a diagnosis share: the recordings, what fits models to them, and what judges predictions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.core.recording import Recording
+from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.follower import Follower
+from wipx.diagnosis.heldout import Transfer, transfer
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.selection import Selection
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.sim.analytic import AnalyticSimulator
+
+HORIZON = 0.5  # [s] of predictions, contract section 4
+TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """The means of one diagnosis.
+
+    Attributes:
+        fitter: Fits hypotheses to the recordings.
+        setting: The robot, as its owner believes it to be.
+        first_levels: A first guess of the noise.
+        judge: Predicts recordings.
+        recordings: Of the robot.
+    """
+
+    fitter: Fitter
+    setting: Setting
+    first_levels: NoiseLevels
+    judge: Judge
+    recordings: tuple[Recording, ...]
+
+    @classmethod
+    def of(
+        cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator, lead: float
+    ) -> "Inquiry":
+        """The means for recordings of a robot; `lead` is the time before a prediction that its state is taken from."""
+        plant = setting.nominal.plant
+        log = Log.of(recordings, plant)
+        noise = sensor_noise(recordings, plant)
+        rates = [_rate_noise(recordings, plant.rates[c - log.joints]) for c in log.channels if c >= log.joints]
+        levels = NoiseLevels(np.full(log.joints, 0.01), np.array([*noise, *rates]))
+        fitter = Fitter(Follower.of(simulator, log, setting.nominal))
+        return cls(fitter, setting, levels, Judge(simulator, noise, HORIZON, lead), recordings)
+
+    @property
+    def log(self) -> Log:
+        """The recordings."""
+        return self.fitter.follower.log
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether any command ever changes."""
+        return bool(np.ptp(self.log.inputs.commands, axis=0).max() > 0.0)
+
+    def transfers(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
+        return self.heldout_gain(transfer(self.fitter, larger), smaller) > -TOLERATED
+
+    def heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
+        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
+        before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings))
+        return 1.0 - self.heldout_error(repeated) / before if before > 0.0 else 0.0
+
+    def heldout_error(self, repeated: Transfer) -> float:
+        """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
+        folds = zip(repeated.models, self.recordings, strict=True)
+        return self._squared_error([self.judge.predict(model, (recording,))[0] for model, recording in folds])
+
+    def reduced(self, selection: Selection, fit: Fit, *gone: str) -> Fit:
+        """The fit without some of its effects, its stand-in kept."""
+        rest = tuple(e for e in fit.effects if e not in gone)
+        setting = self.setting_of(fit)
+        if setting is self.setting:
+            return selection.fitted(rest, fit) if rest else selection.nominal
+        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
+        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+
+    def setting_of(self, fit: Fit) -> Setting:
+        """The robot, with the stand-in of a fit where it has one."""
+        model = fit.hypothesis.space.model
+        extra = {
+            name: values
+            for name, values in model.effects.items()
+            if name not in fit.effects and name not in self.setting.nominal.effects
+        }
+        if not extra:
+            return self.setting
+        return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
+
+    def _squared_error(self, predicted: list[np.ndarray]) -> float:
+        columns = self.log.plant.coordinates
+        return sum(
+            float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
+            for recording, coordinates in zip(self.recordings, predicted, strict=True)
+        )
+
+
+def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
+    """Standard deviation of a recorded rate's noise, by second differences."""
+    values = np.concatenate([np.diff(r[column], 2) for r in recordings])
+    return max(1.4826 * float(np.median(np.abs(values))) / np.sqrt(6.0), 1e-9)
