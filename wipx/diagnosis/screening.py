@@ -76,7 +76,7 @@ def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Ef
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
     base = fit.white.ravel()
-    basis = _basis(fit.jacobian[: base.size])
+    basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
     scan = SCANS.get(effect.kind)
     atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else scan(fitter, fit, basis)
@@ -108,8 +108,9 @@ def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np
     return np.array([p.low for p in effect.parameters]) * sizes, np.array([p.high for p in effect.parameters]) * sizes
 
 
-def _basis(jacobian: np.ndarray) -> np.ndarray:
-    """Orthonormal basis of the columns of a matrix (N, D)."""
+def basis_of(fit: Fit) -> np.ndarray:
+    """What small changes of a fit's numbers make of its white innovations, orthonormal, shape (R m (K + 1), D)."""
+    jacobian = fit.jacobian[: fit.white.size]
     if not jacobian.shape[1]:
         return np.zeros((len(jacobian), 0))
     return np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0]

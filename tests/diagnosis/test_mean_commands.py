@@ -1,0 +1,53 @@
+"""Thresholds of the actuator beside a log that has means of noisy commands only."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis.recorded import SIMULATOR, Bench, Recordings, slow
+from identify.emulated_robot import nominal_model
+
+from wipx.core.model import ModelBatch
+from wipx.core.recording import Recording
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.sim.inputs import Inputs
+
+NOISE = 1.5  # [N] of the single commands, as a controller makes of noisy rates
+LIMITS = {
+    "actuator/dead_zone": {"band": 0.8},
+    "actuator/saturation": {"F_max": 5.0},
+    "actuator/speed_limit": {"F_stall": 6.0, "v_free": 1.2},
+}
+
+
+def noisily_driven(effect: str, seed: int) -> Recordings:
+    """An axis on a spring that noisy commands swing, logged at every third row."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 8.0, 0.002)
+    robot = nominal_model("linear_axis").with_effects({effect: LIMITS[effect], "environment/spring": SPRING})
+    found = []
+    for number in range(3):
+        swing = 5.0 * np.sin(2.0 * np.pi * rng.uniform(0.5, 0.8) * t + rng.uniform(0.0, 6.0))
+        u = swing * np.sin(2.0 * np.pi * 0.1 * t) + rng.normal(0.0, NOISE, len(t))
+        run = SIMULATOR.replay(ModelBatch(robot), Inputs.of([t], [u[:, None]], [0]), np.zeros((2, 1, 1)))
+        x = run.coordinates[:, 0, 0, 0] + rng.normal(0.0, 1e-5, len(t))
+        found.append(Recording(f"r{number}.csv", {"t": t, "x": x, "u": u}, "emulated"))
+    return slow(tuple(found), rng)
+
+
+SPRING = {"k": 40.0, "x0": 0.0}
+
+
+@pytest.mark.parametrize("effect", LIMITS)
+def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, fresh_seed: int):
+    nominal = nominal_model("linear_axis").with_effects({"environment/spring": SPRING})
+    case = Bench(nominal, noisily_driven(effect, fresh_seed), {})
+    truth = {f"{effect}.{symbol}": value for symbol, value in LIMITS[effect].items()}
+    fit = case.fitter.polished(case.fitter.fit(Hypothesis.of(case.setting, (effect,), truth), case.quiet))
+    for name, value in truth.items():
+        assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.03)
+    # Three commands a row: their spread about the mean is known from how the means scatter.
+    assert case.log.command_spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
+    assert 0.6 < fit.levels.spread < 1.6
+    single = case.fitter.fit(fit.hypothesis, replace(fit.levels, spread=1e-9))
+    assert fit.log_likelihood > single.log_likelihood + 20.0
