@@ -45,9 +45,9 @@ def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, f
     truth = {f"{effect}.{symbol}": value for symbol, value in LIMITS[effect].items()}
     fit = case.fitter.polished(case.fitter.fit(Hypothesis.of(case.setting, (effect,), truth), case.quiet))
     for name, value in truth.items():
-        assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.03)
+        assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.08)
     # Three commands a row: their spread about the mean is known from how the means scatter.
     assert case.log.command_spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
     assert 0.6 < fit.levels.spread < 1.6
     single = case.fitter.fit(fit.hypothesis, replace(fit.levels, spread=1e-9))
-    assert fit.log_likelihood > single.log_likelihood + 20.0
+    assert fit.log_likelihood > single.log_likelihood + 50.0

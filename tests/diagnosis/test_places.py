@@ -26,7 +26,9 @@ def test_a_sticky_spot_is_found_where_it_is(width: float, fresh_seed: int):
     truth = {"F_c": 0.5, "lo": float(place[0]), "hi": float(place[1])}
     case = bench("linear_axis", {"translation/sticky_spot": truth}, fresh_seed)
     level, lo, hi = guesses(sticky_spots, case)[0]
-    assert [lo, hi] == pytest.approx(place.tolist(), abs=0.05 * np.ptp(x))
+    passed = np.concatenate([r["x"] for r in case.recordings])
+    seen = np.clip(place, passed.min(), passed.max())  # friction may keep the axis from going all the way
+    assert [lo, hi] == pytest.approx(seen.tolist(), abs=0.05 * np.ptp(passed))
     assert level == pytest.approx(truth["F_c"], rel=0.5)
 
 
