@@ -22,6 +22,7 @@ class Effect:
         source: Paper or book.
         excludes: Kinds that cannot act at the same site at the same time.
         needs: Joints or plant parameters without which the effect has no meaning.
+        doubt: Relative standard deviation of its first number by what its law leaves open.
         beyond: Whether contract section 3 lacks it: a diagnosis names such an effect only where those of the
             contract leave something over.
     """
@@ -34,6 +35,7 @@ class Effect:
     linear_in: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    doubt: float = 0.0
     beyond: bool = False
 
     @property

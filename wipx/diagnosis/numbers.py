@@ -28,8 +28,9 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
     chance = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
-    deviation = np.sqrt(chance**2 + shift_by_step(fitter, fit) ** 2 + (wider * doubt_of_spread(fitter, fit)) ** 2)
     values = space.to_values(cube)
+    doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
+    deviation = np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
     low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
     high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
     # A number without any influence may be anything.
@@ -89,6 +90,17 @@ def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
     finer = Fitter(replace(follower, simulator=replace(follower.simulator, step=0.5 * follower.simulator.step)))
     change = finer.white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
     return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
+
+
+def doubt_of_laws(fit: Fit) -> np.ndarray:
+    """What laws leave open, in standard deviations in the cube, shape (D,)."""
+    space, plant = fit.hypothesis.space, fit.hypothesis.model.plant
+    share = np.zeros(len(space.free))
+    for effect in fit.effects:
+        law = effect_of(effect, plant)
+        share[space.names.index(f"{effect}.{law.parameters[0].name}")] = law.doubt
+    values = space.to_values(fit.hypothesis.cube)
+    return np.abs(space.to_cube((1.0 + share) * values) - fit.hypothesis.cube)
 
 
 def doubt_of_spread(fitter: Fitter, fit: Fit) -> np.ndarray:

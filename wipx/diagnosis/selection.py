@@ -7,7 +7,7 @@ that the small print of a law is not filled up with further effects.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -32,6 +32,7 @@ WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
+LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
 LEAST_LEAD = 2.0  # nats by which a replacement must be better
 
 
@@ -78,7 +79,7 @@ class Selection:
                 added = [effect for effect in best.effects if effect not in current.effects]
                 gain = self.evidence(current, best)
                 self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
-                current = self.pruned(best)
+                current = self.pruned(self.settled(best))
                 continue
             if len(best.effects) > FREE_EFFECTS and not self.transfers(current, best):
                 self.considered.append(
@@ -88,7 +89,7 @@ class Selection:
                 )
                 break
             self._remember(current, extended, best)
-            current = self.pruned(best)
+            current = self.pruned(self.settled(best))
         return self.exchanged(current)
 
     def evidence(self, smaller: Fit, larger: Fit) -> float:
@@ -157,6 +158,18 @@ class Selection:
         self._fits[frozenset(fit.effects)] = again
         return again
 
+    def settled(self, fit: Fit) -> Fit:
+        """A fit, or a better one of the same effects that a search with louder forces leads to.
+
+        Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother.
+        """
+        louder = replace(fit.levels, force=LOUDER * fit.levels.force)
+        again = self.fitter.polished(self.fitter.fit(fit.hypothesis, louder))
+        if again.log_likelihood < fit.log_likelihood + 1.0:
+            return fit
+        self._fits[frozenset(fit.effects)] = again
+        return again
+
     def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
         """The fit with the most evidence beyond a base, or a simpler one that is as good."""
         if not fits:
@@ -205,7 +218,7 @@ class Selection:
             if best is fit:
                 break
             self._fits[frozenset(best.effects)] = best
-            fit = self.pruned(best)
+            fit = self.pruned(self.settled(best))
         return fit
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
