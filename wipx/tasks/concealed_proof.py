@@ -43,7 +43,7 @@ def notes(cases: Sequence[Opened], account: Account, alarms: Count) -> tuple[str
     if alarms.total and alarms.interval[1] > FALSE_ALARM_BAR:
         found.append(
             f"With nothing hidden in {robots(alarms.total)}, the rate of false alarms lies in {interval(alarms)}; to "
-            f"judge it against the bar of {bar()} takes more of them (profile=full)."
+            f"judge it against the bar of {bar()} takes more of them (task.cases)."
         )
     if account.given:
         found.append(
