@@ -77,6 +77,7 @@ def rich_physics(nominal: Model, rng: np.random.Generator) -> HiddenPhysics:
         "gap": rng.uniform(1.5e-3, 3e-3) * lever,
         "drive_inertia": 2.2e-3 / lever**2,
         "drive_damping": rng.uniform(0.01, 0.03) / lever**2,
+        "returned": 0.0,
     }
     return HiddenPhysics(
         nominal.with_effects(effects),
