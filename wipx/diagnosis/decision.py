@@ -19,7 +19,7 @@ from wipx.diagnosis.stand_in import with_curve
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
-BESIDE_MEANS = 3.0  # times as much where a threshold acts on commands of which the log has means only
+BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 
@@ -85,7 +85,8 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
     strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < SIGNIFICANT else 0.0)
     p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
     explained = fit.motion_likelihood - selection.nominal.motion_likelihood
-    worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained) * (BESIDE_MEANS if fit.levels.spread > 0.0 else 1.0)
+    averaged = any(recording.periods > 1 for recording in inquiry.recordings)
+    worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained) * (BESIDE_MEANS if averaged else 1.0)
     significant = p_value < SIGNIFICANT and strongest.gain >= worth
     if not significant and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
