@@ -15,6 +15,7 @@ from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
 from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
 from wipx.diagnosis.stand_in import with_curve
+from wipx.effects.catalogue import effect_of
 
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
@@ -71,12 +72,17 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
 
 
 def _with_simple_law(selection: Selection, fit: Fit, effect: str) -> Fit | None:
-    """The fit with the simple law that an effect contains in its place; None where it contains none."""
+    """The fit with the simple law that an effect contains in its place; None where it contains none or has no room."""
     site, _, kind = effect.partition("/")
-    simple = f"{site}/{CONTAINS.get(kind)}"
-    if kind not in CONTAINS or simple in fit.effects:
+    if kind not in CONTAINS:
         return None
-    return selection.fitted((*(e for e in fit.effects if e != effect), simple), fit)
+    simple = f"{site}/{CONTAINS[kind]}"
+    rest = tuple(e for e in fit.effects if e != effect)
+    plant = fit.hypothesis.model.plant
+    beside = [e for e in rest if e.startswith(f"{site}/")]
+    if simple in rest or any(CONTAINS[kind] in effect_of(e, plant).excludes for e in beside):
+        return None
+    return selection.fitted((*rest, simple), fit)
 
 
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
