@@ -15,8 +15,8 @@ from wipx.diagnosis.fitting import Fitter
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.log import SETTLES, Log
 from wipx.diagnosis.observer import (
+    BEFORE,
     DIFFUSE,
-    UNHEARD,
     UNSETTLED,
     Gains,
     Linearisation,
@@ -159,7 +159,8 @@ def plain_filter(linear: Linearisation, log: Log, levels: NoiseLevels, late: np.
     for k in range(int(log.inputs.last[r]) + 1):
         if k > 0 and t[k - 1] <= SETTLES < t[k]:
             p = first
-        heard = [v if c >= joints or t[k] >= late[c] else UNHEARD for v, c in zip(variance, log.channels, strict=True)]
+        unseen = [0.0 if c >= joints else max(late[c] - t[k], 0.0) for c in log.channels]
+        heard = variance + (BEFORE * np.array(unseen)) ** 2
         s = h @ p @ h.T + np.diag(heard)
         gain = p @ h.T @ np.linalg.inv(s)
         gains.append(np.zeros_like(first))

@@ -55,6 +55,23 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class Combined:
+    """One law that the vocabulary lacks in the place of several effects that were found.
+
+    Attributes:
+        name: "site/kind".
+        instead_of: The effects.
+        lead: Penalised log-likelihood that it has beyond theirs [nats]; about zero where recordings cannot tell.
+        parameters: Its values if it were the one, by symbol [SI].
+    """
+
+    name: str
+    instead_of: tuple[str, ...]
+    lead: float
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class FoundEffect:
     """Physics that was left out.
 
@@ -334,6 +351,7 @@ class Diagnosis:
         traces: Recordings beside predictions, held-out ones first.
         notes: Warnings a reader must know, one sentence each.
         seconds: That the diagnosis took.
+        combined: Laws that the vocabulary lacks and that explain several of the effects at once as well.
         suspects: What was asked about after the answer was complete, and what these recordings say of it.
     """
 
@@ -357,4 +375,5 @@ class Diagnosis:
     traces: tuple[Trace, ...]
     notes: tuple[str, ...]
     seconds: float
+    combined: tuple[Combined, ...] = ()
     suspects: tuple[Suspect, ...] = ()

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from wipx.core.diagnosis import Alternative, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
+from wipx.core.diagnosis import Alternative, Combined, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words
+from wipx.diagnosis.combined import combined
 from wipx.diagnosis.curves import law_curve
 from wipx.diagnosis.decision import Rest
 from wipx.diagnosis.experiment import Question, next_experiment
@@ -40,6 +41,7 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
     verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
     unexplained = _unexplained(inquiry, rest)
+    as_one = () if rest.significant else combined(inquiry, selection, fit)
     location = located(inquiry.fitter, selection.nominal, fit, effects, unexplained.site)
     draft = Diagnosis(
         title="",
@@ -57,11 +59,12 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
         unexplained=unexplained,
         candidates=tuple(selection.considered),
         bounds=bounds(selection.prospects_of(fit), inquiry.log.plant),
-        weak=_weak(effects),
+        weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
         traces=traces,
         notes=(),
         seconds=0.0,
+        combined=as_one,
     )
     return replace(draft, sentence=sentence(draft))
 
@@ -164,6 +167,15 @@ def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
                 found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
         for name in effect.equivalent:
             found.append(f"{effect.name} cannot be told from {name}")
+    return tuple(found)
+
+
+def _as_one(laws: tuple[Combined, ...], plant_kind: str) -> tuple[str, ...]:
+    found = []
+    for law in laws:
+        sizes = ", ".join(f"{symbol} = {value:.3g}" for symbol, value in law.parameters.items())
+        words = f"{effect_in_words(law.name, plant_kind)} ({sizes}), which the vocabulary lacks"
+        found.append(f"{' and '.join(law.instead_of)} together cannot be told from {words}")
     return tuple(found)
 
 

@@ -23,6 +23,7 @@ LEFTOVER_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+VISIBLE = 0.05  # of the squared error of held-out predictions, that an effect beside a larger one must remove
 
 
 @dataclass(frozen=True)
@@ -51,23 +52,27 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
     if not fit.effects:
         return fit
     repeated = transfer(inquiry.fitter, fit)
-    with_it = inquiry.judge.predict(fit.hypothesis.model, inquiry.recordings)
+    predicted = np.concatenate(inquiry.judge.predict(fit.hypothesis.model, inquiry.recordings))
+    without = {effect: selection.without(fit, effect) for effect in fit.effects}
+    gains = {effect: selection.evidence(without[effect], fit) for effect in fit.effects}
+    leading = max(gains, key=lambda effect: gains[effect])
     for effect in reversed(fit.effects):
-        rest = tuple(e for e in fit.effects if e != effect)
-        reduced = selection.fitted(rest, fit) if rest else selection.nominal
-        without = inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings)
-        change = np.concatenate(with_it) - np.concatenate(without)
-        irrelevant = bool(np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise))
+        reduced, gain = without[effect], gains[effect]
+        change = predicted - np.concatenate(inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings))
         known = row_likelihoods(inquiry.fitter, reduced, reduced.white).sum(axis=1)
-        gain = selection.evidence(reduced, fit)
         # An effect that gains much and does not transfer points to something else that is missing.
-        lost = float(np.sum(repeated.likelihoods - known)) <= 0.0 and gain < DOUBTFUL
-        if irrelevant or lost:
-            reason = "changes no prediction to speak of" if irrelevant else "does not transfer to held-out recordings"
-            selection.considered.append(Candidate(effect, gain, False, reason))
-            plain = _with_simple_law(selection, fit, effect)
-            worth = plain is not None and selection.worthwhile(reduced, plain)
-            return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
+        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
+            reason = "changes no prediction to speak of"
+        elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
+            reason = "does not transfer to held-out recordings"
+        elif effect != leading and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
+            reason = f"does not show in held-out predictions beside {leading}"
+        else:
+            continue
+        selection.considered.append(Candidate(effect, gain, False, reason))
+        plain = _with_simple_law(selection, fit, effect)
+        worth = plain is not None and selection.worthwhile(reduced, plain)
+        return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
     return fit
 
 

@@ -202,10 +202,17 @@ class Fitter:
     def likeliest(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels, count: int) -> list[Hypothesis]:
         """The likeliest few of hypotheses of the same effects, as they are."""
         cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
-        innovations = self._innovations(hypotheses[0], cubes, levels)
+        gains = [self.follower.gains(levels, hypothesis.model) for hypothesis in hypotheses]
+        alike = np.array([next(i for i, other in enumerate(gains) if other is own) for own in gains])
+        different, group = np.unique(alike, return_inverse=True)
+        observers = tuple(gains[i] for i in different)
+        batch = hypotheses[0].space.batch(cubes)
+        innovations = self.follower.innovations(batch, observers, group, np.full(batch.size, levels.spread))
+        scales = [_log_determinant(observer.whitening, self.follower.log) for observer in observers]
         priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
         log = self.follower.log
         likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
+        likelihoods += np.array(scales)[group]
         return [hypotheses[i] for i in np.argsort(-likelihoods)[:count]]
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:

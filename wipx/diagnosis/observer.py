@@ -23,7 +23,7 @@ PROBE = 1e-3  # damping by which the answer to a force is found [N s/m or N m s/
 GRID = 0.1  # [rad] between the angles about which the body is linearised
 UNSETTLED = 100.0  # how much noisier forces count while the state is settling
 DIFFUSE = 1e4  # how much larger the variance of the first state is, which is read off noisy, perhaps late sensors
-UNHEARD = 1e6  # variance of a sensor that tells nothing [m^2, rad^2]
+BEFORE = 1.0  # how fast a joint moves before its recording, at most [m/s, rad/s]
 
 
 @dataclass(frozen=True)
@@ -278,10 +278,10 @@ def _begin(covariance, sensor, time, k):
 
 @cached
 def _hear(sensor, time, delay, noise):
-    """Variance of a sensor's noise: a late one shows at first what was before the recording."""
+    """Variance of a sensor's noise: a late one shows at first what was before the recording, at unknown speeds."""
     for level in range(len(sensor)):
         for r in range(len(time)):
-            noise[level * len(time) + r] = sensor[level] if time[r] >= delay else UNHEARD
+            noise[level * len(time) + r] = sensor[level] + (BEFORE * max(delay - time[r], 0.0)) ** 2
 
 
 @cached

@@ -4,8 +4,6 @@ Both laws fit somewhat at many places, so their likelihood has many peaks. The l
 place is enough to compare them all; the screening then simulates the best ones.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from wipx.diagnosis.fitting import Fit, Fitter
@@ -37,7 +35,7 @@ def ripples(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     angles = [motion[plant.coordinates[joint]] / radius for joint in joints]
     way = max(float(np.ptp(angle[rows])) for angle in angles)
     numbers = max(1.0, TURNED / max(way, 1e-9)) * np.arange(1, FREQUENCIES + 1)
-    left = _left(fit, basis)
+    left = left_of(fit, basis)
     found = []
     for begin in range(0, FREQUENCIES, TOGETHER):
         part = numbers[begin : begin + TOGETHER, None, None]
@@ -73,7 +71,7 @@ def sticky_spots(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     slopes = response(fitter, fit, 0, np.where(inside, -direction(rate, log.rows), 0.0))
     slopes = slopes - basis @ (basis.T @ slopes)
     # A spot is some bins in a row: sums over it are differences of sums from the beginning.
-    score = np.concatenate([[0.0], np.cumsum(slopes.T @ _left(fit, basis))])
+    score = np.concatenate([[0.0], np.cumsum(slopes.T @ left_of(fit, basis))])
     normal = np.zeros((BINS + 1, BINS + 1))
     normal[1:, 1:] = np.cumsum(np.cumsum(slopes.T @ slopes, axis=0), axis=1)
     low, high = np.triu_indices(BINS + 1, 1)
@@ -88,10 +86,7 @@ def sticky_spots(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     return np.column_stack([level[chosen], edges[low[chosen]], edges[high[chosen]]])
 
 
-SCANS: dict[str, Callable[[Fitter, Fit, np.ndarray], np.ndarray]] = {"ripple": ripples, "sticky_spot": sticky_spots}
-
-
-def _left(fit: Fit, basis: np.ndarray) -> np.ndarray:
+def left_of(fit: Fit, basis: np.ndarray) -> np.ndarray:
     """White innovations, freed of what a basis imitates."""
     white = fit.white.ravel()
     return white - basis @ (basis.T @ white)

@@ -4,7 +4,7 @@ A score test (Rao 1948): the change that a small dose of an effect makes in the 
 freed of what the numbers already in the model can imitate, is compared with the innovations themselves.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,11 +15,20 @@ from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Setting
-from wipx.diagnosis.places import SCANS
+from wipx.diagnosis.limits import saturations, speed_limits
+from wipx.diagnosis.places import ripples, sticky_spots
 from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
+FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
 CHUNK = 24  # models simulated at once; bounds the memory
+
+SCANS: dict[str, Callable[[Fitter, Fit, np.ndarray], np.ndarray]] = {
+    "ripple": ripples,
+    "sticky_spot": sticky_spots,
+    "saturation": saturations,
+    "speed_limit": speed_limits,
+}  # first guesses that take more than a grid
 
 
 @dataclass(frozen=True)
@@ -72,6 +81,19 @@ def doses(effect: Effect, scales: Scales) -> np.ndarray:
     return np.array(list(product(*axes)))
 
 
+def undosed(setting: Setting, name: str) -> list[dict[str, float]]:
+    """The doses of an effect as they are, where screening scales all of its numbers; none where it scales not all.
+
+    What an effect does is not always proportional to it: a late sensor also asks for another observer.
+    """
+    effect = vocabulary(setting.nominal.plant)[name]
+    if len(effect.linear_in) < len(effect.parameters):
+        return []
+    names = [f"{name}.{p.name}" for p in effect.parameters]
+    atoms = doses(effect, setting.scales[name.partition("/")[0]]).tolist()
+    return [dict(zip(names, atom, strict=True)) for atom in atoms]
+
+
 def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Effect) -> list[Prospect]:
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
@@ -94,7 +116,7 @@ def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Ef
             if grown.any():
                 dose = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
             values = np.where(grown, neutral + dose * (atom - neutral), atom)
-            if size[i] == 0.0 or np.any(values < low) or np.any(values > high):
+            if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
                 continue
             gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
             deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf

@@ -16,12 +16,13 @@ from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.nested import simple_values, simpler
 from wipx.diagnosis.robust import inflation
-from wipx.diagnosis.screening import Prospect, prospects
+from wipx.diagnosis.screening import Prospect, prospects, undosed
 
 MOST_EFFECTS = 8
 FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill up what nothing explains
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
+MOST_ASKED = 80.0  # nats that the share asks for, at most
 CONSIDERED = 6  # effects that are fitted in each step
 PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
 LOOKED_AT = 8  # starts of each effect that are simulated
@@ -118,7 +119,8 @@ class Selection:
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
         overstated = inflation(larger, self.fitter.follower.log, indices)
-        return float(overstated * (penalty + max(LEAST_GAIN, LEAST_SHARE * explained)))
+        share = min(LEAST_SHARE * explained, MOST_ASKED)
+        return float(overstated * (penalty + max(LEAST_GAIN, share)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""
@@ -254,7 +256,8 @@ class Selection:
 
     def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
         effects = (*fit.effects, starts[0].effect)
-        begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start.values}) for start in starts]
+        values = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
+        begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start}) for start in values]
         likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
         fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
         return max(fits, key=lambda f: f.log_likelihood)

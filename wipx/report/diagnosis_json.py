@@ -28,6 +28,15 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
         },
         "unexplained": _unexplained(diagnosis.unexplained),
         "bounds": [_bound(bound) for bound in diagnosis.bounds],
+        "combined": [
+            {
+                "name": one.name,
+                "instead_of": list(one.instead_of),
+                "lead": float(one.lead),
+                "parameters": _floats(one.parameters),
+            }
+            for one in diagnosis.combined
+        ],
         "suspects": [_suspect(suspect) for suspect in diagnosis.suspects],
         "identifiability": {"weak": list(diagnosis.weak), "next_experiment": next_step(diagnosis.next_experiment)},
         "notes": list(diagnosis.notes),
