@@ -29,6 +29,7 @@ from wipx.sim.simulator import StateFeedback
 
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
 CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
+CLOSE_SHARE = 0.1  # or this share of what the effect gains
 
 
 def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
@@ -122,15 +123,22 @@ def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tu
         name = next(iter(set(other.effects) - rest), effect)
         if name == effect or _is_richer(other, name, effect, inquiry.log):
             continue
-        if selection.evidence(base, fit) - selection.evidence(base, other) < CLOSE_CALL:
-            again = inquiry.fitter.polished(inquiry.fitter.fit(other.hypothesis, fit.levels))
-            other = max(other, again, key=lambda found: found.log_likelihood)
+        if selection.evidence(other, fit) < max(CLOSE_CALL, CLOSE_SHARE * selection.evidence(base, fit)):
+            other = _looked_at_again(inquiry, fit, other)
         loss = selection.evidence(base, fit) - selection.evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
         rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
         weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
     rivals.sort(key=lambda rival: rival.separation)
     return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
+
+
+def _looked_at_again(inquiry: Inquiry, fit: Fit, rival: Fit) -> Fit:
+    """A rival fitted with the noise of the answer; what they share starts from its own values or the answer's."""
+    shared = Hypothesis.of(inquiry.setting, rival.effects, {**rival.hypothesis.values, **fit.hypothesis.values})
+    start = inquiry.fitter.likeliest([rival.hypothesis, shared], fit.levels, 1)[0]
+    again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
+    return max(rival, again, key=lambda found: found.log_likelihood)
 
 
 def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:

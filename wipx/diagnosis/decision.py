@@ -6,9 +6,9 @@ import numpy as np
 
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis.fitting import Fit
-from wipx.diagnosis.heldout import row_likelihoods, transfer
+from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers
 from wipx.diagnosis.nested import CONTAINS
 from wipx.diagnosis.screening import prospects
@@ -23,7 +23,10 @@ LEFTOVER_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
-VISIBLE = 0.05  # of the squared error of held-out predictions, that an effect beside a larger one must remove
+RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
+GIVEN_UP = 0.1  # of that effect's gain, that they may lack
+MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
+VISIBLE = 0.05  # of their squared error, that it must remove
 
 
 @dataclass(frozen=True)
@@ -65,15 +68,35 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
             reason = "changes no prediction to speak of"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif effect != leading and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
+        elif gain < MINOR * gains[leading] and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
+            rival = _rival_that_transfers(inquiry, selection, fit, effect, repeated, gain)
+            if rival is not None:
+                reason = "held-out recordings contradict it, and not what is in its place"
+                selection.considered.append(Candidate(effect, gain, False, reason))
+                return confirmed(inquiry, selection, rival)
             continue
         selection.considered.append(Candidate(effect, gain, False, reason))
         plain = _with_simple_law(selection, fit, effect)
         worth = plain is not None and selection.worthwhile(reduced, plain)
         return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
     return fit
+
+
+def _rival_that_transfers(
+    inquiry: Inquiry, selection: Selection, fit: Fit, effect: str, repeated: Transfer, gain: float
+) -> Fit | None:
+    """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
+    if inquiry.heldout_gain(repeated, selection.without(fit, effect)) >= -TOLERATED:
+        return None
+    error = inquiry.heldout_error(repeated)
+    for other in selection.replacements(fit, effect)[:RIVALS]:
+        if set(other.effects) != set(fit.effects) and selection.evidence(other, fit) < GIVEN_UP * gain:
+            again = inquiry.fitter.polished(inquiry.fitter.fit(other.hypothesis, fit.levels))
+            if inquiry.heldout_error(transfer(inquiry.fitter, again)) < (1.0 - VISIBLE) * error:
+                return again
+    return None
 
 
 def _with_simple_law(selection: Selection, fit: Fit, effect: str) -> Fit | None:
