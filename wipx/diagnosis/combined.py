@@ -4,14 +4,15 @@ Both are in the vocabulary, so that recordings which show the one show the other
 say so.
 """
 
+from dataclasses import replace
+
 from wipx.core.diagnosis import Combined
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
-from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.selection import LOUDER, Selection
 
 CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a constant force on a joint
-UNEVEN = 0.5  # share of the Coulomb level by which directions differ at first
 TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
 
@@ -23,12 +24,10 @@ def combined(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Combined
             name = f"{friction.partition('/')[0]}/asymmetric_coulomb"
             level = fit.hypothesis.values[f"{friction}.F_c"]
             rest = tuple(effect for effect in fit.effects if effect not in (friction, constant))
-            starts = []
-            for plus, minus in ((1.0 + UNEVEN, 1.0 - UNEVEN), (1.0 - UNEVEN, 1.0 + UNEVEN)):
-                values = {f"{name}.F_plus": plus * level, f"{name}.F_minus": minus * level}
-                starts.append(Hypothesis.of(inquiry.setting, (*rest, name), {**fit.hypothesis.values, **values}))
-            start = inquiry.fitter.likeliest(starts, fit.levels, 1)[0]
-            other = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
+            start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
+            hypothesis = Hypothesis.of(inquiry.setting, (*rest, name), start)
+            louder = replace(fit.levels, force=LOUDER * fit.levels.force)
+            other = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, louder))
             lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
             if lead > -TOLD_APART:
                 values = other.hypothesis.values

@@ -44,7 +44,9 @@ def _likely(fitter: Fitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> 
     plant = log.plant
     motion = motion_of(fitter, fit)
     joints = [plant.joints.index(site) for site in plant.actuated]
-    forces = [np.where(log.rows, motion[command], 0.0) for command in plant.commands]
+    model = fit.hypothesis.model
+    gain = model.parameters["input_gain"] * model.effects.get("actuator/gain", {}).get("k", 1.0)
+    forces = [np.where(log.rows, gain * motion[command], 0.0) for command in plant.commands]
     rates = [motion[plant.rates[joint]] for joint in joints]
     largest = max(float(np.abs(force).max()) for force in forces)
     fastest = max(float(np.abs(rate[log.rows]).max()) for rate in rates)
