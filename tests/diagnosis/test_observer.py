@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.recorded import SIMULATOR, Bench, bench
+from diagnosis.recorded import SIMULATOR, Bench, bench, recorded
 from identify.emulated_robot import nominal_model
 from scipy.linalg import solve_discrete_are
 from sim.robots import unit_axis
@@ -110,6 +110,23 @@ def discretised(a: np.ndarray, drive: np.ndarray, steps: int = 400) -> tuple[np.
         covariance = small @ (covariance + 0.5 * h * drive) @ small.T + 0.5 * h * drive
         transition = small @ transition
     return transition, covariance
+
+
+@pytest.mark.parametrize("kind", ["wip", "cartpole"])
+def test_a_late_noisy_sensor_beside_a_precise_one_is_followed_from_the_first_row(kind: str, fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    late, noise = 0.014, 3e-3  # [s], [rad]
+    exact = recorded(kind, {"sensor_theta/delay": {"tau": late}}, fresh_seed)
+    noisy = [{**r.columns, "theta": r["theta"] + noise * rng.normal(size=len(r))} for r in exact]
+    recordings = tuple(Recording(r.name, columns, r.source) for r, columns in zip(exact, noisy, strict=True))
+    case = Bench(nominal_model(kind), recordings, {})
+    base = case.fit()
+    likelihoods = [base.log_likelihood]
+    for tau in (0.5 * late, late):
+        hypothesis = Hypothesis.of(case.setting, ("sensor_theta/delay",), {"sensor_theta/delay.tau": tau})
+        likelihoods.append(case.fitter.fit(hypothesis, base.levels, steps=0).log_likelihood)
+    # What the sensor has not shown yet must not be read off the first errors of the other one.
+    assert np.all(np.diff(likelihoods) > 10.0)
 
 
 def uneven_log(kind: str, rng: np.random.Generator) -> Log:

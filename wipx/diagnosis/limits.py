@@ -49,7 +49,7 @@ def _likely(fitter: Fitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> 
     forces = [np.where(log.rows, gain * motion[command], 0.0) for command in plant.commands]
     rates = [motion[plant.rates[joint]] for joint in joints]
     largest = max(float(np.abs(force).max()) for force in forces)
-    fastest = max(float(np.quantile(np.abs(rate[log.counted]), FAST)) for rate in rates)
+    fastest = max(1e-9, *(float(np.quantile(np.abs(rate[log.counted]), FAST)) for rate in rates))
     pairs = np.array([(limit * largest, speed * fastest) for speed in speeds for limit in LIMITS])
     left = left_of(fit, basis)
     gains = np.zeros(len(pairs))
