@@ -3,6 +3,8 @@
 import pytest
 from diagnosis.recorded import bench
 
+from wipx.report.diagnosis_summary import summary
+
 
 def test_friction_that_differs_by_direction_is_told(fresh_seed: int):
     hidden = {"translation/asymmetric_coulomb": {"F_plus": 0.3, "F_minus": 0.8}}
@@ -15,6 +17,7 @@ def test_friction_that_differs_by_direction_is_told(fresh_seed: int):
     assert law.parameters["F_plus"] == pytest.approx(0.3, rel=0.05)
     assert law.parameters["F_minus"] == pytest.approx(0.8, rel=0.05)
     assert any("differs by direction" in sentence for sentence in answer.weak)
+    assert "may be one: Coulomb friction that differs by direction on the rail joint" in summary(answer)
 
 
 def test_friction_beside_a_spring_is_not(fresh_seed: int):

@@ -5,6 +5,7 @@ from wipx.core.words import effect_in_words
 from wipx.report.diagnosis_words import (
     VERDICTS,
     capitalised,
+    combined_sentence,
     nats,
     next_step,
     percent,
@@ -21,6 +22,7 @@ def summary(diagnosis: Diagnosis) -> str:
     lines = [f"{diagnosis.title} ({kind}): {VERDICTS[diagnosis.verdict]}", diagnosis.sentence, ""]
     for effect in diagnosis.effects:
         lines += _effect_lines(effect, kind)
+    lines += [f"  {combined_sentence(law, kind)}" for law in diagnosis.combined]
     if diagnosis.corrected:
         corrected = ", ".join(value_in_words(number) for number in diagnosis.corrected)
         lines.append(f"  corrected: {corrected}")

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wipx.core.diagnosis import Diagnosis, FoundEffect, NextExperiment, Period, Region
+from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, NextExperiment, Period, Region
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
@@ -98,6 +98,13 @@ def tie_sentence(effect: FoundEffect, plant_kind: str) -> str:
         return ""
     others = " or ".join(effect_in_words(name, plant_kind) for name in effect.equivalent)
     return f"These recordings cannot tell {effect_in_words(effect.name, plant_kind)} from {others}."
+
+
+def combined_sentence(law: Combined, plant_kind: str) -> str:
+    """That several effects may be one law which the vocabulary lacks."""
+    effects = " and ".join(effect_in_words(name, plant_kind) for name in law.instead_of)
+    one = f"{effect_in_words(law.name, plant_kind)} ({values_in_words(law.parameters)})"
+    return f"{capitalised(effects)} may be one: {one}; these recordings cannot tell."
 
 
 def region_sentence(region: Region, units: Mapping[str, str]) -> str:
