@@ -61,7 +61,7 @@ EFFECT = Effect(
     ),
     law="0 while the drive crosses the gap, F in contact",
     linear_in=("gap",),
-    doubt=0.25,  # flanks give way, and another drive crosses the gap in another way: a third off on robots of other code
+    doubt=0.25,  # flanks give way, and another drive crosses the gap in another way: on others it is a third off
     source="Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38(10)",
 )
 
