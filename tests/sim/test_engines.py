@@ -26,6 +26,7 @@ ANALYTIC = AnalyticSimulator(threads=1)
 ENGINES = (BulletSimulator(), MujocoSimulator())
 EVERY = pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
 AGREED = 1e-3  # [m, rad] within 1.2 s, which is asked of engines
+LIMIT = 0.2  # of the largest command, so that it is met
 ROUND_OFF = 1e-9  # all engines have the same integrator; least masses and the order of sums are left
 PAPER = {"F_s": 0.15, "F_c": 0.12, "v_s": 0.2, "sigma": 0.02, "epsilon": 0.01, "alpha": 0.7}  # the paper's figure
 PAPERS = {"translation/lagged_stribeck": PAPER, "pitch/lagged_stribeck": PAPER}
@@ -42,7 +43,9 @@ def uneven(rng: np.random.Generator, rows: int) -> np.ndarray:
 def forceful(kind: str, name: str) -> Model:
     """A robot with an effect of noticeable size."""
     effect = vocabulary(PLANTS[kind])[name]
-    values = {p.name: (p.grid[0] if p.grid else p.start) * SIZES.of(p.dimension) for p in effect.parameters}
+    usual = {p.name: p.grid[0] if p.grid else p.start for p in effect.parameters}
+    usual |= {p.name: LIMIT for p in effect.parameters if p.dimension == "limit"}
+    values = {p.name: usual[p.name] * SIZES.of(p.dimension) for p in effect.parameters}
     values = {p.name: values[p.name] or 0.3 * p.high * SIZES.of(p.dimension) for p in effect.parameters}
     special = {
         "remainder": {"signal": 3.0 if kind == "pendulum" else 2.0, "low": -1.0, "high": 1.0}
