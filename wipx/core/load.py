@@ -1,7 +1,7 @@
 """A known weight on the body, beside its axis too: how it changes the rigid body and its equilibrium."""
 
 from dataclasses import dataclass, replace
-from math import atan2, hypot
+from math import atan2, cos, hypot, sin
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model
@@ -28,25 +28,24 @@ class Load:
         """The model with the load on its body: mass, centre of mass, inertia about it, equilibrium pitch.
 
         Raises:
-            InputError: the model has no body on a carriage, or a centre of mass beside its axis already.
+            InputError: the model has no body on a carriage.
         """
         p = model.parameters
         if "com_height" not in p or "wheel_mass" not in p:
             raise InputError(f"load: a {model.plant.kind} has no body that could carry one; leave the load out")
-        if BALANCE in model.effects:
-            raise InputError(f"load: the model has {BALANCE} already; give the unloaded robot without it")
         if self.mass == 0.0:
             return model
         mass = p["body_mass"] + self.mass
-        up = (p["body_mass"] * p["com_height"] + self.mass * self.height) / mass
-        across = self.mass * self.side / mass
+        lean = model.effects.get(BALANCE, {}).get("theta_eq", 0.0)  # of the body without the load
+        up = (p["body_mass"] * p["com_height"] * cos(lean) + self.mass * self.height) / mass
+        across = (p["body_mass"] * p["com_height"] * sin(lean) + self.mass * self.side) / mass
         about_axis = (
             p["body_inertia"] + p["body_mass"] * p["com_height"] ** 2 + self.mass * (self.height**2 + self.side**2)
         )
         com = hypot(up, across)
         body = {**p, "body_mass": mass, "com_height": com, "body_inertia": about_axis - mass * com**2}
         loaded = replace(model, parameters=body)
-        return loaded.with_effects({BALANCE: {"theta_eq": atan2(across, up)}}) if across else loaded
+        return loaded.with_effects({BALANCE: {"theta_eq": atan2(across, up)}}) if across or lean else loaded
 
     def equilibrium(self, model: Model) -> float:
         """Pitch at which the loaded robot balances [rad]; the paper's theta_lin."""
