@@ -185,7 +185,6 @@ def test_a_seed_decides_everything(training: TrainingSet):
         (lambda: Watch(lean=-0.1), "lean is -0.1"),
         (lambda: ObservationNoise(amplitude=-1.0), "noise: amplitude is -1"),
         (lambda: made(watch=Watch(period=1e-3)), r"period is 0.001 s, expected 0.00154 s or more"),
-        (lambda: made(WIP.with_effects({BALANCE: {"theta_eq": 0.1}})), "the model has geometry/com_offset already"),
     ],
 )
 def test_bad_settings_are_refused_in_one_line(build, message: str):
