@@ -89,15 +89,6 @@ def test_outside_physics_is_flagged_or_silently_aliased():
     assert flagged.exact is None
 
 
-def test_an_alias_is_not_silent_where_the_answer_tells_the_hidden_law_too():
-    hidden = truth(tier="outside", outside={"name": "asymmetric_friction"})
-    given = answer("mismatch", named("pitch/coulomb"), named("sensor_theta/bias"))
-    told = {**given, "combined": [{"name": "pitch/asymmetric_coulomb", "instead_of": ["pitch/coulomb"]}]}
-    assert judged(hidden, given).aliased is True
-    assert judged(hidden, told).aliased is False
-    assert judged(hidden, told).flagged is False
-
-
 def test_all_sites_of_several_effects_need_a_share():
     found = (named("translation/coulomb"), named("geometry/com_offset"))
     hidden = truth(COULOMB, LEAN, tier="pair")

@@ -22,7 +22,7 @@ SINGLE: dict[str, tuple[str, Effects]] = {
     "scale": ("wip", {"sensor_x/scale": {"e": 0.05}}),
     "lag": ("linear_axis", {"actuator/lag": {"tau": 0.02}}),
     "drag": ("linear_axis", {"translation/quadratic_drag": {"c": 1.0}}),
-    "Stribeck": ("pendulum", {"pitch/stribeck": {"F_c": 0.03, "F_s": 0.06, "v_s": 0.1}}),
+    "Stribeck": ("pendulum", {"pitch/stribeck": {"F_c": 0.03, "F_s": 0.06, "v_s": 0.3}}),
     "unactuated": ("cartpole", {"pitch/coulomb": {"F_c": 0.01}}),
     "elbow": ("double_pendulum", {"joint2/viscous": {"sigma": 0.05}}),
 }

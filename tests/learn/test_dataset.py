@@ -43,12 +43,14 @@ def training() -> TrainingSet:
     return made()
 
 
-def test_many_loads_change_a_body_as_one_does():
-    loads = LoadRanges().draw(WIP, 40, np.random.default_rng(1))
-    heavier = ModelBatch(WIP, ("body_mass", "wheel_mass"), np.array([[5.0, 1.2], [6.0, 1.0]]))
+@pytest.mark.parametrize("lean", [0.0, 0.05])
+def test_many_loads_change_a_body_as_one_does(lean: float):
+    leaning = WIP.with_effects({BALANCE: {"theta_eq": lean}}) if lean else WIP
+    loads = LoadRanges().draw(leaning, 40, np.random.default_rng(1))
+    heavier = ModelBatch(leaning, ("body_mass", "wheel_mass"), np.array([[5.0, 1.2], [6.0, 1.0]]))
     robots = carrying(heavier, loads)
     for i, (mass, height, side) in enumerate(loads.tolist()):
-        body = WIP.with_values({"body_mass": 5.0 + i % 2, "wheel_mass": 1.2 - 0.2 * (i % 2)})
+        body = leaning.with_values({"body_mass": 5.0 + i % 2, "wheel_mass": 1.2 - 0.2 * (i % 2)})
         one = Load(mass, height, side).on(body)
         for name in (*one.parameters, f"{BALANCE}.theta_eq"):
             assert robots.column(name)[i] == pytest.approx(one.value(name), abs=1e-12), name  # round-off only

@@ -139,10 +139,6 @@ def test_command_in_volts_is_read_with_an_input_gain():
         (LOADED.replace("mass: 0.8", "mass: -0.8"), "m08: mass = -0.8, expected a non-negative number of kg"),
         (LOADED.replace("height: 0.45", "height: high"), "m08: height is 'high', expected a number (m, above"),
         (LOADED.replace('"m08_*.csv"', "8"), "m08: recordings is 8, expected a pattern of file names"),
-        (
-            LOADED + "effects: {geometry/com_offset: {theta_eq: 0.1}}",
-            "loads: m08: load: the model has geometry/com_offset",
-        ),
         ("plant: [wip\n", "line 2: no YAML"),
         ("", "the file is empty"),
         ("- wip\n", "the file is a list"),

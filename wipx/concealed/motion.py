@@ -78,7 +78,8 @@ def smooth_forces(y, r):
     x, theta, v, w = y[0], y[1], y[3], y[4]
     f0 = -v * (r.viscous[0] + r.drag[0] * abs(v) - r.regeneration[0] + r.regeneration_cubic[0] * v * v)
     f1 = -w * (r.viscous[1] + r.drag[1] * abs(w) - r.regeneration[1] + r.regeneration_cubic[1] * w * w)
-    f0 -= r.spring * (x - r.spring_rest)
+    f0 -= r.spring * (x - r.spring_rest) + v * (r.viscous_forward[0] if v > 0.0 else r.viscous_backward[0])
+    f1 -= w * (r.viscous_forward[1] if w > 0.0 else r.viscous_backward[1])
     if r.cog_torque != 0.0:
         f1 += r.cog_torque * math.sin(r.cog_number * theta + r.cog_phase)
     return f0 - r.hysteresis[0] * y[10], f1 - r.hysteresis[1] * y[11]

@@ -68,11 +68,22 @@ def _drift(name: str, draw: Draw) -> Oddity:
 
 
 def _asymmetric(name: str, draw: Draw) -> Oddity:
-    """Dry friction of one level forwards and another one backwards."""
+    """Dry and viscous friction of one size forwards and another one backwards (Bona and Indri 2005).
+
+    Dry friction alone would not do: of two levels it is Coulomb friction and a constant force, which have names.
+    """
     joint = draw.rng.choice(MOVING[draw.robot.kind])
-    level = draw.rng.uniform(0.08, 0.25) * draw.doing.force[joint]
-    uneven = draw.rng.choice([-1.0, 1.0]) * draw.rng.uniform(0.4, 0.9) * level
-    return Oddity(name, {"kinetic": level, "static": level, "one_sided": uneven}, int(joint))
+    level, damping = draw.rng.uniform(0.08, 0.25, size=2) * draw.doing.force[joint]
+    damping /= draw.doing.speed[joint]
+    uneven, uneven_damping = draw.rng.choice([-1.0, 1.0], size=2) * draw.rng.uniform(0.4, 0.9, size=2)
+    values = {
+        "kinetic": level,
+        "static": level,
+        "one_sided": uneven * level,
+        "viscous_forward": (1.0 + uneven_damping) * damping,
+        "viscous_backward": (1.0 - uneven_damping) * damping,
+    }
+    return Oddity(name, values, int(joint))
 
 
 def _hysteresis(name: str, draw: Draw) -> Oddity:

@@ -9,7 +9,6 @@ from itertools import pairwise, permutations
 from math import isfinite, sqrt
 from typing import Any
 
-SAME_LAW = {"asymmetric_friction": "asymmetric_coulomb"}  # outside physics, and the kind by which an answer may tell it
 LEAST_SHARE = 0.1  # of the mismatch that a site must be given to count as named
 
 
@@ -93,7 +92,7 @@ class CaseScore:
         time_error: The same of the payload's event and the times named, mean over recordings.
         parameters: Of the effects that were named as they are hidden.
         flagged: Whether outside physics was called unexplained.
-        aliased: Whether outside physics was explained away by the vocabulary, without a word of the law that is hidden.
+        aliased: Whether outside physics was explained away by the vocabulary.
         removed: Share of the explainable squared error on unseen recordings that is gone, where physics is hidden.
         over_floor: Error there over what a perfect model would leave.
         seconds: Time of the diagnosis [s].
@@ -169,17 +168,11 @@ def score(
         time_error=_time_error(truth["times"], location["times"]),
         parameters=_parameters(hidden, named),
         flagged=verdict == "unexplained" if outside else None,
-        aliased=verdict == "mismatch" and not _told(outside, diagnosis) if outside else None,
+        aliased=verdict == "mismatch" if outside else None,
         removed=errors.removed() if errors is not None and (hidden or outside) else None,
         over_floor=None if errors is None else errors.over_floor(),
         seconds=seconds,
     )
-
-
-def _told(outside: str, diagnosis: Mapping[str, Any]) -> bool:
-    """Whether the answer says that the hidden law explains as much as the effects which it names."""
-    laws = [one["name"].partition("/")[2] for one in diagnosis.get("combined", ())]
-    return SAME_LAW.get(outside) in laws
 
 
 def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) -> CaseScore:

@@ -3,14 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise, product
-from math import tan
+from math import cos, sin, tan
 
 import numpy as np
 
 from wipx.control.balance_watch import check_carriage
 from wipx.control.loop import Loop
 from wipx.core.errors import InputError, check_positive
-from wipx.core.load import Load
+from wipx.core.load import BODY, Load, with_lean
 from wipx.core.margins import Recovery, RecoveryRegion
 from wipx.core.model import Model
 from wipx.sim.inputs import Inputs
@@ -54,9 +54,9 @@ class Releases:
 
     def load(self, model: Model, mass: float, pitch: float) -> Load:
         """The load of that mass with which the robot balances at that pitch."""
-        p = model.parameters
-        up = p["body_mass"] * p["com_height"] + mass * self.height
-        return Load(mass, self.height, up * tan(pitch) / mass)
+        body_mass, com_height, _, lean = (with_lean(model).value(name) for name in BODY)
+        up = body_mass * com_height * cos(lean) + mass * self.height
+        return Load(mass, self.height, (up * tan(pitch) - body_mass * com_height * sin(lean)) / mass)
 
 
 class _StoppedError(Exception):

@@ -1,12 +1,14 @@
 """A known weight on the body, beside its axis too: how it changes the rigid body and its equilibrium."""
 
-from dataclasses import dataclass, replace
-from math import atan2, cos, hypot, sin
+from dataclasses import dataclass
+
+import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 
 BALANCE = "geometry/com_offset"
+BODY = ("body_mass", "com_height", "body_inertia", f"{BALANCE}.theta_eq")  # what a load changes
 
 
 @dataclass(frozen=True)
@@ -30,24 +32,41 @@ class Load:
         Raises:
             InputError: the model has no body on a carriage.
         """
-        p = model.parameters
-        if "com_height" not in p or "wheel_mass" not in p:
+        if "com_height" not in model.parameters or "wheel_mass" not in model.parameters:
             raise InputError(f"load: a {model.plant.kind} has no body that could carry one; leave the load out")
         if self.mass == 0.0:
             return model
-        mass = p["body_mass"] + self.mass
-        lean = model.effects.get(BALANCE, {}).get("theta_eq", 0.0)  # of the body without the load
-        up = (p["body_mass"] * p["com_height"] * cos(lean) + self.mass * self.height) / mass
-        across = (p["body_mass"] * p["com_height"] * sin(lean) + self.mass * self.side) / mass
-        about_axis = (
-            p["body_inertia"] + p["body_mass"] * p["com_height"] ** 2 + self.mass * (self.height**2 + self.side**2)
-        )
-        com = hypot(up, across)
-        body = {**p, "body_mass": mass, "com_height": com, "body_inertia": about_axis - mass * com**2}
-        loaded = replace(model, parameters=body)
-        return loaded.with_effects({BALANCE: {"theta_eq": atan2(across, up)}}) if across or lean else loaded
+        leaning = with_lean(model)
+        body = np.array([leaning.value(name) for name in BODY])
+        loaded = loaded_body(body, np.array([self.mass, self.height, self.side]))
+        return leaning.with_values(dict(zip(BODY, loaded.tolist(), strict=True)))
 
     def equilibrium(self, model: Model) -> float:
         """Pitch at which the loaded robot balances [rad]; the paper's theta_lin."""
         loaded = self.on(model)
         return loaded.effects.get(BALANCE, {}).get("theta_eq", 0.0)
+
+
+def with_lean(model: Model) -> Model:
+    """The model with an equilibrium pitch, zero where it had none."""
+    return model.with_effects({BALANCE: {"theta_eq": 0.0}, **model.effects})
+
+
+def loaded_body(body: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Bodies with a point mass fixed to each.
+
+    Args:
+        body: Numbers named in `BODY`, shape (4, ...) [kg, m, kg m^2, rad].
+        load: Mass, height and side, shape (3, ...) [kg, m, m].
+
+    Returns:
+        What `BODY` names, of the bodies with their loads, shape (4, ...); the inertia is about the new centre of mass.
+    """
+    own, com_height, inertia, lean = body
+    mass, height, side = load
+    total = own + mass
+    up = (own * com_height * np.cos(lean) + mass * height) / total
+    across = (own * com_height * np.sin(lean) + mass * side) / total
+    about_axis = inertia + own * com_height**2 + mass * (height**2 + side**2)
+    squared = up**2 + across**2
+    return np.stack([total, np.sqrt(squared), about_axis - total * squared, np.arctan2(across, up)])

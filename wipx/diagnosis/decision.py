@@ -10,12 +10,10 @@ from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers
-from wipx.diagnosis.nested import CONTAINS
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
 from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
 from wipx.diagnosis.stand_in import with_curve
-from wipx.effects.catalogue import effect_of
 
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
@@ -26,7 +24,8 @@ IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not ma
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
 MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-VISIBLE = 0.05  # of their squared error, that it must remove
+SMALL_PRINT = 150.0  # nats; what gains more is not taken for the small print of another law
+VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
             reason = "changes no prediction to speak of"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif gain < MINOR * gains[leading] and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
+        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
             rival = _rival_that_transfers(inquiry, selection, fit, effect, repeated, gain)
@@ -78,7 +77,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
                 return confirmed(inquiry, selection, rival)
             continue
         selection.considered.append(Candidate(effect, gain, False, reason))
-        plain = _with_simple_law(selection, fit, effect)
+        plain = selection.plainer(fit, effect)
         worth = plain is not None and selection.worthwhile(reduced, plain)
         return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
     return fit
@@ -97,20 +96,6 @@ def _rival_that_transfers(
             if inquiry.heldout_error(transfer(inquiry.fitter, again)) < (1.0 - VISIBLE) * error:
                 return again
     return None
-
-
-def _with_simple_law(selection: Selection, fit: Fit, effect: str) -> Fit | None:
-    """The fit with the simple law that an effect contains in its place; None where it contains none or has no room."""
-    site, _, kind = effect.partition("/")
-    if kind not in CONTAINS:
-        return None
-    simple = f"{site}/{CONTAINS[kind]}"
-    rest = tuple(e for e in fit.effects if e != effect)
-    plant = fit.hypothesis.model.plant
-    beside = [e for e in rest if e.startswith(f"{site}/")]
-    if simple in rest or any(CONTAINS[kind] in effect_of(e, plant).excludes for e in beside):
-        return None
-    return selection.fitted((*rest, simple), fit)
 
 
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:

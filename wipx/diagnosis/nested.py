@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from wipx.core.plant import Plant
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.robust import covariance
+from wipx.effects.catalogue import effect_of
 from wipx.identify.noise import quantisation
 
 CONTAINS = {  # rich law: the simple one that it can always imitate
@@ -31,6 +33,15 @@ def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
             if len(set(rest)) == len(rest):
                 return rest
     return None
+
+
+def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None:
+    """The simple law that an effect contains; None where it contains none, or none that may stand beside the others."""
+    site, _, kind = effect.partition("/")
+    simple = f"{site}/{CONTAINS[kind]}" if kind in CONTAINS else None
+    here = [e for e in beside if e.startswith(f"{site}/")]
+    excluded = simple in beside or any(CONTAINS.get(kind) in effect_of(e, plant).excludes for e in here)
+    return None if excluded else simple
 
 
 def simple_values(fit: Fit) -> dict[str, float]:

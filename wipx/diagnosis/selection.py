@@ -14,7 +14,7 @@ import numpy as np
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.nested import simple_values, simpler
+from wipx.diagnosis.nested import simple_law, simple_values, simpler
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import Prospect, prospects, undosed
 
@@ -34,7 +34,7 @@ PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
 LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
-LEAST_LEAD = 2.0  # nats by which a replacement must be better
+LEAST_LEAD = 4.0  # nats by which a replacement must be better
 
 
 def taken_for_granted(smaller: Fit, larger: Fit) -> bool:
@@ -72,7 +72,8 @@ class Selection:
             best = self.preferred(extended, current)
             if best is not None:
                 current = self.caught_up(current, best)
-            if best is None or not self.worthwhile(current, best):
+                best = self._worth_it(current, [best, *extended])
+            if best is None:
                 self._remember(current, extended, None)
                 best = self._pair(current, extended)
                 if best is None:
@@ -90,7 +91,10 @@ class Selection:
                 )
                 break
             self._remember(current, extended, best)
-            current = self.pruned(self.settled(best))
+            pruned = self.pruned(self.settled(best))
+            if len(pruned.effects) == len(current.effects) and self._lead(pruned, current) < LEAST_LEAD:
+                break  # another effect in the place of one, and hardly better
+            current = pruned
         return self.exchanged(current)
 
     def evidence(self, smaller: Fit, larger: Fit) -> float:
@@ -128,6 +132,21 @@ class Selection:
         if key not in self._extensions:
             self._extensions[key] = self._extended(fit)
         return self._extensions[key]
+
+    def _worth_it(self, current: Fit, extended: list[Fit]) -> Fit | None:
+        """The first fit whose further effect is worth it, or the simple law of a rich one that is not; None without."""
+        for found in extended:
+            plain = None if self.worthwhile(current, found) else self.plainer(found, found.effects[-1])
+            chosen = found if plain is None else plain
+            if self.worthwhile(current, chosen):
+                return chosen
+        return None
+
+    def plainer(self, fit: Fit, effect: str) -> Fit | None:
+        """The fit with the simple law that an effect contains in its place; None where there is none or no room."""
+        rest = tuple(e for e in fit.effects if e != effect)
+        simple = simple_law(effect, rest, fit.hypothesis.model.plant)
+        return None if simple is None else self.fitted((*rest, simple), fit)
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
@@ -214,9 +233,8 @@ class Selection:
             for effect in fit.effects:
                 base = self.without(fit, effect)
                 found = self.preferred(self.extensions(base), base)
-                lead = -np.inf if found is None else self.score(found, base) - self.score(fit, base)
-                if found is not None and lead > most:
-                    best, most = found, lead
+                if found is not None and self._lead(found, fit) > most and self.worthwhile(base, found):
+                    best, most = found, self._lead(found, fit)
             if best is fit:
                 break
             self._fits[frozenset(best.effects)] = best
@@ -231,6 +249,9 @@ class Selection:
         """The fit of the other effects."""
         rest = tuple(e for e in fit.effects if e != effect)
         return self.fitted(rest, fit) if rest else self.nominal
+
+    def _lead(self, fit: Fit, other: Fit) -> float:
+        return self.score(fit, self.nominal) - self.score(other, self.nominal)
 
     def _tolerance(self, best: Fit) -> float:
         return max(4.0, LEAST_SHARE * self.evidence(self.nominal, best))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wipx.core.errors import InputError
-from wipx.core.load import BALANCE, Load
+from wipx.core.load import BODY, Load, with_lean
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.identify.parameter_space import ParameterSpace
@@ -20,7 +20,6 @@ from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Simulator, StateFeedback
 
 FELL_OVER = 1e3  # [m, rad]; what a trajectory that diverged counts
-BODY = ("body_mass", "com_height", "body_inertia", "geometry/inertia.scale")  # what a load changes
 LINE = 0.05  # [s] of rows through which the line goes that gives coordinates and rates of a moving start
 STILL = 0.01  # [s] of rows whose mean is the place of a start at rest
 
@@ -296,11 +295,9 @@ def _loaded_bodies(model: Model, loads: Sequence[Load | None]) -> tuple[Model, t
     """A model that can carry every load, the numbers of its body that loads change, and their values (R, 4)."""
     if not any(loads):
         return model, (), np.zeros((len(loads), 0))
-    names = ("body_mass", "com_height", "body_inertia", f"{BALANCE}.theta_eq")
-    upright = {BALANCE: {"theta_eq": 0.0}}
-    loaded = [model if load is None else load.on(model) for load in loads]
-    values = [[m.with_effects({**upright, **m.effects}).value(name) for name in names] for m in loaded]
-    return model.with_effects(upright), names, np.array(values)
+    leaning = with_lean(model)
+    loaded = [leaning if load is None else load.on(leaning) for load in loads]
+    return leaning, BODY, np.array([[m.value(name) for name in BODY] for m in loaded])
 
 
 def _check_loads(classes: Sequence[str], loads: Sequence[Load | None], space: ParameterSpace) -> None:
@@ -310,7 +307,7 @@ def _check_loads(classes: Sequence[str], loads: Sequence[Load | None], space: Pa
             raise InputError(
                 f"objective.classes: the recordings of class {label} had different loads; tell them apart by name"
             )
-    freed = [name for name in space.names if name in BODY]
+    freed = [name for name in space.names if name in (*BODY, "geometry/inertia.scale")]
     if freed and any(load is not None for load in loads):
         raise InputError(f"{freed[0]} is free or uncertain, but known loads change it; give the unloaded body as exact")
 

@@ -1,17 +1,16 @@
 """Loads drawn at random, and many robots that carry one each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
 
 from wipx.core.errors import InputError
-from wipx.core.load import BALANCE, Load
+from wipx.core.load import BALANCE, BODY, Load, loaded_body, with_lean
 from wipx.core.model import Model, ModelBatch
 
 POOL = 100  # loads that are drawn for each that is taken
 BINS = 40  # of equilibrium pitch, over which those that are taken are spread evenly
-BODY = ("body_mass", "com_height", "body_inertia")  # what a load changes
 
 
 @dataclass(frozen=True)
@@ -87,22 +86,11 @@ def carrying(robots: ModelBatch, loads: np.ndarray) -> ModelBatch:
     """
     Load(0.0, 0.0, 0.0).on(robots.model)  # refuses a robot that cannot carry one
     carrier = np.arange(len(loads)) % robots.size
-    body_mass, com_height, body_inertia = (robots.column(name)[carrier] for name in BODY)
-    mass, height, side = loads.T
-    total = body_mass + mass
-    up = (body_mass * com_height + mass * height) / total
-    across = mass * side / total
-    about_axis = body_inertia + body_mass * com_height**2 + mass * (height**2 + side**2)
-    squared = up**2 + across**2
-    changed = {
-        "body_mass": total,
-        "com_height": np.sqrt(squared),
-        "body_inertia": about_axis - total * squared,
-        f"{BALANCE}.theta_eq": np.arctan2(across, up),
-    }
-    kept = {name: robots.column(name)[carrier] for name in robots.names if name not in changed}
-    model = robots.model.with_effects({BALANCE: {"theta_eq": 0.0}})
-    return ModelBatch(model, (*kept, *changed), np.column_stack([*kept.values(), *changed.values()]))
+    leaning = replace(robots, model=with_lean(robots.model))
+    body = np.stack([leaning.column(name)[carrier] for name in BODY])
+    kept = [name for name in robots.names if name not in BODY]
+    values = [*(robots.column(name)[carrier] for name in kept), *loaded_body(body, loads.T)]
+    return ModelBatch(leaning.model, (*kept, *BODY), np.column_stack(values))
 
 
 def equilibria(robots: ModelBatch) -> np.ndarray:
