@@ -10,16 +10,19 @@ from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers
+from wipx.diagnosis.numbers import shift_by_step
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
 from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
 from wipx.diagnosis.stand_in import with_curve
+from wipx.effects.catalogue import effect_of
 
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
+UNSETTLED = 3.0  # times what the simulator's step moves a size, below which that size is numerics
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
@@ -58,6 +61,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
     without = {effect: selection.without(fit, effect) for effect in fit.effects}
     gains = {effect: selection.evidence(without[effect], fit) for effect in fit.effects}
     leading = max(gains, key=lambda effect: gains[effect])
+    unsettled = _unsettled(inquiry, fit)
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
         change = predicted - np.concatenate(inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings))
@@ -65,6 +69,8 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
         # An effect that gains much and does not transfer points to something else that is missing.
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
             reason = "changes no prediction to speak of"
+        elif effect in unsettled:
+            reason = "is as small as what the step of the simulation changes"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
         elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
@@ -81,6 +87,20 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
         worth = plain is not None and selection.worthwhile(reduced, plain)
         return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
     return fit
+
+
+def _unsettled(inquiry: Inquiry, fit: Fit) -> list[str]:
+    """Effects whose sizes move by about as much as they are when the simulator halves its step."""
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    size = np.abs(cube - space.neutral)
+    settled = size > UNSETTLED * shift_by_step(inquiry.fitter, fit)
+    found = []
+    for effect in fit.effects:
+        law = effect_of(effect, fit.hypothesis.model.plant)
+        grows = [space.names.index(f"{effect}.{symbol}") for symbol in law.linear_in]
+        if grows and not settled[grows].any():
+            found.append(effect)
+    return found
 
 
 def _rival_that_transfers(

@@ -22,6 +22,7 @@ MOST_EFFECTS = 8
 FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill up what nothing explains
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
+STICKING_SHARE = 0.05  # that bristles gain by how a joint comes to rest, where their bending is invisible
 MOST_ASKED = 80.0  # nats that the share asks for, at most
 CONSIDERED = 6  # effects that are fitted in each step
 PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
@@ -199,7 +200,7 @@ class Selection:
         replaced = simpler(best, self.fitter.follower.log)
         while replaced is not None:
             found = self.fitted(replaced, best)
-            if self.score(found, base) < self.score(best, base) - self._tolerance(best):
+            if self.score(found, base) < self.score(best, base) - self._tolerance(best, replaced):
                 break
             best = found
             replaced = simpler(best, self.fitter.follower.log)
@@ -253,8 +254,10 @@ class Selection:
     def _lead(self, fit: Fit, other: Fit) -> float:
         return self.score(fit, self.nominal) - self.score(other, self.nominal)
 
-    def _tolerance(self, best: Fit) -> float:
-        return max(4.0, LEAST_SHARE * self.evidence(self.nominal, best))
+    def _tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
+        """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""
+        rests = any(effect.endswith("/presliding") for effect in best.effects if effect not in simple)
+        return max(4.0, (STICKING_SHARE if rests else LEAST_SHARE) * self.evidence(self.nominal, best))
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.prospects_of(fit)
