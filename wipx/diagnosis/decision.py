@@ -17,7 +17,8 @@ from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
 from wipx.diagnosis.stand_in import with_curve
 from wipx.effects.catalogue import effect_of
 
-SIGNIFICANT = 1e-4  # p value, corrected, of a leftover
+SIGNIFICANT = 1e-4  # p value, corrected, of a leftover where nothing is named
+BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more of it is less of a surprise
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 LEFTOVER_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
@@ -121,12 +122,13 @@ def _rival_that_transfers(
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
     found = leftovers(inquiry.fitter, fit, shapes)
-    strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < SIGNIFICANT else 0.0)
+    level = BESIDE_EFFECTS if fit.effects else SIGNIFICANT
+    strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < level else 0.0)
     p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
     explained = fit.motion_likelihood - selection.nominal.motion_likelihood
     averaged = any(recording.periods > 1 for recording in inquiry.recordings)
     worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained) * (BESIDE_MEANS if averaged else 1.0)
-    significant = p_value < SIGNIFICANT and strongest.gain >= worth
+    significant = p_value < level and strongest.gain >= worth
     if not significant and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
     resembles, named = _beyond(inquiry, selection, fit, worth)
