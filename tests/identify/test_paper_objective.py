@@ -111,11 +111,14 @@ def test_a_start_from_rest_is_not_taken_for_a_moving_one(releases: Releases):
 @pytest.mark.parametrize("fresh", [False, True], ids=["fixed", "fresh"])
 def test_the_noise_floor_is_what_the_true_model_is_left_with(fresh: bool, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed if fresh else 3)
-    truth = paper_robot(rng)
-    problem = release(truth, rng).problem()
-    left = problem.losses(at(problem, truth))[0]
-    # Errors of the start last as long as a trajectory: eight classes are about as many independent numbers.
-    assert 0.4 < left / problem.noise_floor(at(problem, truth)) < 2.5
+    shares = []
+    for _ in range(5):
+        truth = paper_robot(rng)
+        problem = release(truth, rng).problem()
+        shares.append(problem.losses(at(problem, truth))[0] / problem.noise_floor(at(problem, truth)))
+    # Errors of the start last as long as a trajectory: eight classes are about as many independent numbers, so that
+    # one share is off by 40 % and the mean of five by 20 %.
+    assert 0.5 < np.mean(shares) < 2.0
 
 
 def test_there_is_no_noise_floor_without_a_second_trial():
