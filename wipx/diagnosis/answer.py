@@ -118,13 +118,17 @@ def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tu
     overstated = inflation(fit, inquiry.log, fit.hypothesis.parameters_of(effect))
     rivals, weights = [], []
     rest = set(fit.effects) - {effect}
-    base = selection.without(fit, effect)
+    base = inquiry.reduced(selection, fit, effect)
     for other in selection.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
         if name == effect or _is_richer(other, name, effect, inquiry.log):
             continue
-        if selection.evidence(other, fit) < max(CLOSE_CALL, CLOSE_SHARE * selection.evidence(base, fit)):
-            other = _looked_at_again(inquiry, fit, other)
+        starts = _starts(inquiry, fit, other, effect, name)
+        start = inquiry.fitter.likeliest(starts, fit.levels, 1)[0]
+        close = selection.evidence(other, fit) < max(CLOSE_CALL, CLOSE_SHARE * selection.evidence(base, fit))
+        if close or start is not starts[0]:
+            again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
+            other = max(other, again, key=lambda found: found.log_likelihood)
         loss = selection.evidence(base, fit) - selection.evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
         rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
@@ -133,12 +137,19 @@ def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tu
     return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 
 
-def _looked_at_again(inquiry: Inquiry, fit: Fit, rival: Fit) -> Fit:
-    """A rival fitted with the noise of the answer; what they share starts from its own values or the answer's."""
-    shared = Hypothesis.of(inquiry.setting, rival.effects, {**rival.hypothesis.values, **fit.hypothesis.values})
-    start = inquiry.fitter.likeliest([rival.hypothesis, shared], fit.levels, 1)[0]
-    again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
-    return max(rival, again, key=lambda found: found.log_likelihood)
+def _starts(inquiry: Inquiry, fit: Fit, rival: Fit, effect: str, name: str) -> list[Hypothesis]:
+    """A rival as found; with the answer's values of what they share; with the value of the effect it replaces too.
+
+    The last is the best for two effects of one equation: a bias of the angle, a centre of mass beside the axis.
+    """
+    own = rival.hypothesis.values
+    shared = {**own, **fit.hypothesis.values}
+    values = [own, shared]
+    mine = [p for p in rival.hypothesis.space.free if p.name.startswith(f"{name}.")]
+    theirs = [p for p in fit.hypothesis.space.free if p.name.startswith(f"{effect}.")]
+    if len(mine) == len(theirs) == 1 and mine[0].unit == theirs[0].unit:
+        values.append({**shared, mine[0].name: shared[theirs[0].name]})
+    return [Hypothesis.of(inquiry.setting_of(fit), rival.effects, each) for each in values]
 
 
 def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
