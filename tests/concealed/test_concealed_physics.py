@@ -122,3 +122,25 @@ def test_a_tilted_rail_pulls_down_and_leaves_upright_upright():
     assert v[-1, 0] == pytest.approx(-9.81 * np.sin(0.1) * 99 / 500.0, rel=1e-9)
     held, _, _ = open_loop("pendulum", Hidden({"geometry/com_offset": {"theta_eq": 0.03}}), start=(0.0, 0.03), rows=500)
     np.testing.assert_allclose(held[:, 1], 0.03, atol=1e-12)
+
+
+def test_a_hysteresis_gives_way_by_its_level_and_holds_less():
+    values = {"hysteresis": 2.0, "hysteresis_length": 0.05, "hysteresis_first": 0.3}
+    hidden = Hidden(oddity=Oddity("hysteresis", values))
+    held, _, _ = open_loop("linear_axis", hidden, command=np.full(1000, 0.5))
+    assert 0.0 < held.max() < 0.05  # swings about the place where the elements hold the command
+    q, v, _ = open_loop("linear_axis", hidden, command=np.full(1000, 3.0))
+    slid = q[:, 0] > 0.06  # every element has slipped: the force is its level, the mass 3 kg
+    gain = np.gradient(v[slid, 0], 1.0 / 500.0)
+    np.testing.assert_allclose(gain, (3.0 - 2.0) / 3.0, rtol=1e-3)
+
+
+def test_a_hysteresis_comes_back_as_it_was_built_up_twice_as_wide():
+    values = {"hysteresis": 2.0, "hysteresis_length": 0.02, "hysteresis_first": 0.3}
+    hidden = Hidden({"translation/viscous": {"sigma": 20.0}}, oddity=Oddity("hysteresis", values))
+    slowly = np.concatenate([np.linspace(0.0, 1.8, 4000), np.linspace(1.8, -1.8, 8000), np.linspace(-1.8, 1.8, 8000)])
+    q, _, _ = open_loop("linear_axis", hidden, command=slowly, rows=20000, rate=125.0)
+    virgin, back = q[:4000:40, 0], q[4000:12000:80, 0]
+    # Masing: force and way from the turning point on, halved, are the first loading
+    np.testing.assert_allclose((q[3999, 0] - back) / 2.0, virgin, atol=0.05 * virgin.max())
+    np.testing.assert_allclose(q[-1, 0], q[3999, 0], atol=0.05 * virgin.max())  # the loop closes

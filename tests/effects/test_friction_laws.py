@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from sim.robots import LIVELY, Motion, move, robot, sines
+from scipy.integrate import solve_ivp
+from sim.robots import LIVELY, Motion, move, robot, sines, unit_axis
 
 from wipx.effects import lagged_stribeck, load_friction, quadratic_drag, sticky_spot, stribeck
 from wipx.effects.presliding import bristle
@@ -36,6 +37,29 @@ def test_asymmetric_coulomb_with_equal_levels_is_coulomb():
 def test_lugre_without_bump_and_damping_is_presliding():
     lugre = {"F_c": 0.3, "F_s": 0.3, "v_s": 0.1, "stiffness": 2000.0, "damping": 0.0}
     assert_same(shaken("lugre", lugre), shaken("presliding", {"F_c": 0.3, "stiffness": 2000.0}), 0.0)
+
+
+def test_hysteresis_with_exponent_one_and_no_asymmetry_is_presliding():
+    plain = {"F_c": 0.3, "stiffness": 2000.0}
+    assert_same(shaken("hysteresis", {**plain, "n": 1.0, "gamma": 0.0}), shaken("presliding", plain), 0.0)
+
+
+@given(st.floats(1.0, 4.0), st.floats(-0.5, 0.5))
+@settings(max_examples=20, deadline=None)
+def test_hysteresis_follows_the_equation_of_bouc_and_wen(exponent: float, gamma: float):
+    level, stiffness, pull, pulse = 0.5, 10.0, 3.0, 12.0
+    values = {"F_c": level, "stiffness": stiffness, "n": exponent, "gamma": gamma}
+    t = np.linspace(0.0, 2.0, 2001)
+    motion = move(unit_axis({"translation/hysteresis": values}), (0.0, 0.0), t, pull * np.cos(pulse * t[:-1]))
+
+    def equation(now, state):
+        _, v, z = state
+        forgets = (1.0 - gamma) * abs(v) * abs(z) ** (exponent - 1.0) * z + gamma * v * abs(z) ** exponent
+        return v, pull * np.cos(pulse * np.floor(now * 1000.0) / 1000.0) - level * z, stiffness / level * (v - forgets)
+
+    exact = solve_ivp(equation, (0.0, 2.0), np.zeros(3), max_step=1e-3, rtol=1e-8, atol=1e-10, t_eval=t[::50])
+    assert np.ptp(exact.y[0]) > 2.0 * level / stiffness * 0.3  # it yields
+    np.testing.assert_allclose(motion.q[::50, 0], exact.y[0], atol=2e-3 * np.ptp(exact.y[0]))
 
 
 def test_a_stiffer_bristle_comes_closer_to_coulomb():

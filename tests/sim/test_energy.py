@@ -16,6 +16,7 @@ FRICTION = {
     "stribeck": {"F_c": 0.2, "F_s": 0.4, "v_s": 0.1},
     "presliding": {"F_c": 0.2, "stiffness": 2000.0},
     "lugre": {"F_c": 0.2, "F_s": 0.3, "v_s": 0.1, "stiffness": 2000.0, "damping": 0.5},
+    "hysteresis": {"F_c": 0.2, "stiffness": 2000.0, "damping": 0.0, "n": 2.0, "gamma": 0.3},
     "quadratic_drag": {"c": 0.2},
     "sticky_spot": {"F_c": 0.5, "lo": 0.0, "hi": 0.2},
     "load_friction": {"K_motor": 0.2, "K_external": 0.1},
@@ -30,7 +31,7 @@ AT_JOINTS = [
 ]
 FRICTION_AT_JOINTS = [(kind, name) for kind, name in AT_JOINTS if name.partition("/")[2] not in STORING]
 # A bristle gives back what it has stored: at most F_s^2 / (2 stiffness).
-SPRING_BACK = {"presliding": 0.2**2 / 4000.0, "lugre": 0.3**2 / 4000.0}
+SPRING_BACK = {"presliding": 0.2**2 / 4000.0, "hysteresis": 0.2**2 / 4000.0, "lugre": 0.3**2 / 4000.0}
 TWO_SECONDS = np.linspace(0.0, 2.0, 501)  # rows of 4 ms: whole numbers of steps of 1 and 2 ms
 
 

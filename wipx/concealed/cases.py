@@ -17,7 +17,7 @@ from wipx.concealed.scenario import (
     draw_log_settings,
     draw_scenario,
 )
-from wipx.concealed.sizes import Draw, consequences, draw_details, draw_values, effect_names, family
+from wipx.concealed.sizes import Draw, consequences, draw_details, draw_values, effect_names, families
 from wipx.core.plant import PLANTS
 
 TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hold 120 chances of a false alarm
@@ -158,9 +158,9 @@ def _compatible(plant: str, count: int, tier: str, rng: np.random.Generator) -> 
     taken = {"mass", "scale"} if tier == "wrong_parameters" else set()
     names: list[str] = []
     for name in rng.permutation(effect_names(plant)).tolist():
-        if len(names) < count and family(name) not in taken:
+        if len(names) < count and not families(name) & taken:
             names.append(name)
-            taken.add(family(name))
+            taken |= families(name)
     return tuple(names)
 
 
@@ -233,7 +233,7 @@ def _known(choice: Choice, draw: Draw) -> dict[str, dict[str, float]]:
         return {}
     joint = str(draw.rng.choice(PLANTS[choice.plant].joints))
     name = f"{joint}/viscous"
-    if any(family(other) == family(name) for other in choice.names) or choice.oddity is not None:
+    if any(families(other) & families(name) for other in choice.names) or choice.oddity is not None:
         return {}
     return {name: draw_values(name, draw)}
 

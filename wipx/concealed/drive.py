@@ -44,12 +44,12 @@ def motor(joint, y, asked, r):
 def coupled(y, force, r):
     """Force on the cart through a drive with a mass of its own, and the drive's acceleration.
 
-    The drive, at y[12] with speed y[13], meets the cart through play with stiff flanks, or through a contact that
+    The drive, at y[16] with speed y[17], meets the cart through play with stiff flanks, or through a contact that
     creeps and gives way at `traction`.
     """
     if r.drive_mass == 0.0:
         return force, 0.0
-    slide, creep = y[12] - y[0], y[13] - y[3]
+    slide, creep = y[16] - y[0], y[17] - y[3]
     if r.traction > 0.0:
         passed = r.traction * math.tanh(r.creep * creep / r.traction)
     else:

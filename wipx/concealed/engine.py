@@ -1,8 +1,8 @@
 """A run of a robot: the controller at its instants, and fourth-order Runge-Kutta steps with events in between.
 
-State y: coordinates q0, q1 and the moving mass's (0-2), their rates (3-5), lag (6, 7), bristles (8, 9),
-hysteresis (10, 11), the free drive's place and speed (12, 13). Mode of a joint: 0 sticks, +1 or -1 the direction
-in which it slips.
+State y: coordinates q0, q1 and the moving mass's (0-2), their rates (3-5), lag (6, 7), bristles (8, 9), elements of
+the hysteresis (10-12, 13-15), the free drive's place and speed (16, 17). Mode of a joint: 0 sticks, +1 or -1 the
+direction in which it slips.
 """
 
 import math
@@ -11,10 +11,10 @@ import numpy as np
 
 from wipx.concealed.compiled import equation, kept
 from wipx.concealed.drive import coupled, motor, static_part
-from wipx.concealed.friction import bristle, hysteresis_rate, slipping_force, static_level
+from wipx.concealed.friction import bristle, hysteresis, slipping_force, static_level
 from wipx.concealed.motion import accelerate, cart_and_body, sliding_mass, smooth_forces, two_links
 
-STATES = 14
+STATES = 18
 STEP = 1e-4  # [s]
 SMALLEST_SHARE = 1e-3  # of a step, between two events
 MOST_EVENTS = 12  # in one step; a joint that chatters more is advanced regardless
@@ -30,18 +30,17 @@ def derivative(y, t, asked, mode, r, rates):
     s0, s1 = smooth_forces(y, r)
     b0, rates[8] = bristle(0, y, r)
     b1, rates[9] = bristle(1, y, r)
-    drive0, drive1, rates[13] = 0.0, 0.0, 0.0
+    h0, h1 = hysteresis(0, y, r, rates), hysteresis(1, y, r, rates)
+    drive0, drive1, rates[17] = 0.0, 0.0, 0.0
     if r.driven[0]:
         force, rates[6] = motor(0, y, asked[0], r)
-        drive0, rates[13] = coupled(y, force, r)
+        drive0, rates[17] = coupled(y, force, r)
     if r.driven[1]:
         drive1, rates[7] = motor(1, y, asked[1], r)
-    f0 += s0 + b0 + drive0 + slipping_force(0, y, mode[0], r)
-    f1 += s1 + b1 + drive1 + slipping_force(1, y, mode[1], r)
+    f0 += s0 + b0 + h0 + drive0 + slipping_force(0, y, mode[0], r)
+    f1 += s1 + b1 + h1 + drive1 + slipping_force(1, y, mode[1], r)
     hold0, hold1 = joint_rates(y, m00, m01, m11, f0, f1, mode, r, rates)
-    rates[10] = hysteresis_rate(0, y, r)
-    rates[11] = hysteresis_rate(1, y, r)
-    rates[12] = y[13]
+    rates[16] = y[17]
     return hold0, hold1, drive0, drive1
 
 
@@ -219,14 +218,14 @@ def simulate(r, start, instants, reference, extra, noise, rate_noise, use_gyro, 
     y, work, impulse = np.zeros(STATES), np.zeros((7, STATES)), np.zeros(2)
     mode, rate = np.zeros(2, np.int64), np.zeros(2)
     y[0], y[1] = start[0], start[1]
-    y[12] = y[0]
+    y[16] = y[0]
     active = -1
     for k in range(n):
         if abs(y[0]) > limit[0] or abs(y[1]) > limit[1] or not math.isfinite(y[0] + y[1]):
             return k, shown, q, v, commands, forces
         q[k], v[k] = y[0:2], y[3:5]
         if r.traction > 0.0:  # the encoder sits on the wheel, which slips
-            q[k, 0], v[k, 0] = y[12], y[13]
+            q[k, 0], v[k, 0] = y[16], y[17]
         feel(k, instants, q, v, shown, rate, noise, rate_noise, use_gyro, resolution, cutoff, r)
         feed_back(k, shown, rate, reference, gains, r, commands)
         impulse[:] = 0.0

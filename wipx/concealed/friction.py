@@ -8,6 +8,8 @@ import math
 
 from wipx.concealed.compiled import equation
 
+FIRST_ELEMENT, ELEMENTS = 10, 3  # of the hysteresis in the state: place, and number for each joint
+
 
 @equation
 def place_level(x, r):
@@ -58,14 +60,20 @@ def bristle(joint, y, r):
 
 
 @equation
-def hysteresis_rate(joint, y, r):
-    """Rate of the hysteretic part, which is 1 when it is fully built up (Bouc 1967, Wen 1976; exponent 2).
+def hysteresis(joint, y, r, rates):
+    """Force of springs in parallel, each of which slips at its own way (Maxwell slip, Iwan 1966); fills in `rates`.
 
-    With z' = v / length * (1 - (beta sign(v z) + gamma) z^2), beta + gamma = 1 and gamma = `hysteresis_shape`.
+    An element is bent by 1 when it slips. The ways go from `hysteresis_first` of the longest one to it, so that the
+    force comes back over a reversal as it built up, twice as wide (Masing), which no single bristle does.
     """
+    force = 0.0
     if r.hysteresis[joint] == 0.0:
-        return 0.0
-    v, z = y[3 + joint], y[10 + joint]
-    shape = r.hysteresis_shape[joint]
-    side = 1.0 if v * z > 0.0 else -1.0
-    return v / r.hysteresis_length[joint] * (1.0 - ((1.0 - shape) * side + shape) * z * z)
+        return force
+    v, first = y[3 + joint], r.hysteresis_first[joint]
+    for i in range(ELEMENTS):
+        place = FIRST_ELEMENT + ELEMENTS * joint + i
+        way = r.hysteresis_length[joint] * (first + (1.0 - first) * i / (ELEMENTS - 1))
+        slips = abs(y[place]) >= 1.0 and v * y[place] > 0.0
+        rates[place] = 0.0 if slips else v / way
+        force -= r.hysteresis[joint] / ELEMENTS * min(max(y[place], -1.0), 1.0)
+    return force

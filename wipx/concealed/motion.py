@@ -82,7 +82,7 @@ def smooth_forces(y, r):
     f1 -= w * (r.viscous_forward[1] if w > 0.0 else r.viscous_backward[1])
     if r.cog_torque != 0.0:
         f1 += r.cog_torque * math.sin(r.cog_number * theta + r.cog_phase)
-    return f0 - r.hysteresis[0] * y[10], f1 - r.hysteresis[1] * y[11]
+    return f0, f1
 
 
 @equation

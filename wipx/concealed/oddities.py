@@ -87,12 +87,12 @@ def _asymmetric(name: str, draw: Draw) -> Oddity:
 
 
 def _hysteresis(name: str, draw: Draw) -> Oddity:
-    """A Bouc-Wen element over ways as long as the motion, unlike that of bristles."""
+    """Elements that slip one after the other, over ways as long as the motion, unlike bristles."""
     joint = DRIVEN[draw.robot.kind][0]
     values = {
         "hysteresis": draw.rng.uniform(0.15, 0.4) * draw.doing.force[joint],
         "hysteresis_length": draw.rng.uniform(0.3, 1.0) * draw.doing.spread[joint],
-        "hysteresis_shape": draw.rng.uniform(-0.5, 0.5),
+        "hysteresis_first": draw.rng.uniform(0.2, 0.8),
     }
     return Oddity(name, values, joint)
 

@@ -47,7 +47,7 @@ _PAIRS = (
     ("viscous", 0.0), ("drag", 0.0), ("kinetic", 0.0), ("static", 0.0), ("bump_speed", 1.0), ("one_sided", 0.0),
     ("viscous_forward", 0.0), ("viscous_backward", 0.0),
     ("bristle_level", 0.0), ("bristle_stiffness", 0.0), ("bristle_damping", 0.0),
-    ("hysteresis", 0.0), ("hysteresis_length", 1.0), ("hysteresis_shape", 0.0),
+    ("hysteresis", 0.0), ("hysteresis_length", 1.0), ("hysteresis_first", 1.0),
     ("regeneration", 0.0), ("regeneration_cubic", 0.0),
     ("sensor_bias", 0.0), ("sensor_scale", 0.0), ("sensor_delay", 0.0),
 )  # fmt: skip

@@ -272,13 +272,14 @@ _FAMILIES = {
     "limit": ("saturation", "speed_limit"),
     "play": ("dead_zone", "backlash"),
     "inclination": ("com_offset", "rail_tilt", "bias"),
+    "constant pull": ("rail_tilt", "spring"),  # a tilt moves the place at which a spring rests, and does nothing else
     "mass": ("payload", "payload_event", "inertia"),
     "scale": ("gain", "scale"),
 }
 
 
-def family(name: str) -> str:
+def families(name: str) -> set[str]:
     """What an effect has in common with those that must not be drawn beside it."""
     site, _, law = name.partition("/")
-    found = next((group for group, laws in _FAMILIES.items() if law in laws), law)
-    return f"{site}: {found}" if found in ("dry friction", "damping") else found
+    found = {group for group, laws in _FAMILIES.items() if law in laws} or {law}
+    return {f"{site}: {group}" if group in ("dry friction", "damping") else group for group in found}

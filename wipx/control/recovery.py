@@ -54,7 +54,8 @@ class Releases:
 
     def load(self, model: Model, mass: float, pitch: float) -> Load:
         """The load of that mass with which the robot balances at that pitch."""
-        body_mass, com_height, _, lean = (with_lean(model).value(name) for name in BODY)
+        leaning = with_lean(model)
+        body_mass, com_height, _, lean = (leaning.value(name) for name in BODY)
         up = body_mass * com_height * cos(lean) + mass * self.height
         return Load(mass, self.height, (up * tan(pitch) - body_mass * com_height * sin(lean)) / mass)
 

@@ -40,6 +40,7 @@ _KINDS = MappingProxyType(
         "dead_zone": "dead zone of {place}",
         "delay": "delay of {place}",
         "gain": "wrong gain of {place}",
+        "hysteresis": "hysteresis (Bouc-Wen) on {place}",
         "inertia": "wrong moment of inertia of the body",
         "lag": "first-order lag of {place}",
         "lagged_stribeck": "lagged Stribeck friction on {place}",

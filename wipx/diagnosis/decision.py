@@ -1,8 +1,10 @@
 """What becomes of the effects that the selection chose: which are kept, and what stands in for what they leave over."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis.fitting import Fit
@@ -10,6 +12,7 @@ from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers
+from wipx.diagnosis.nested import richer
 from wipx.diagnosis.numbers import shift_by_step
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
@@ -20,8 +23,9 @@ from wipx.effects.catalogue import effect_of
 SIGNIFICANT = 1e-4  # p value, corrected, of a leftover where nothing is named
 BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more of it is less of a surprise
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
+SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has nine
 LEFTOVER_SHARE = 0.02  # and of what is explained
-BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
+BESIDE_MEANS = 1.5  # times as much a curve where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 UNSETTLED = 3.0  # times what the simulator's step moves a size, below which that size is numerics
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
@@ -122,19 +126,23 @@ def _rival_that_transfers(
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
     found = leftovers(inquiry.fitter, fit, shapes)
-    level = BESIDE_EFFECTS if fit.effects else SIGNIFICANT
-    strongest = max(found, key=lambda leftover: leftover.gain if leftover.p_value < level else 0.0)
     p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
-    explained = fit.motion_likelihood - selection.nominal.motion_likelihood
-    averaged = any(recording.periods > 1 for recording in inquiry.recordings)
-    worth = max(LEFTOVER_GAIN, LEFTOVER_SHARE * explained) * (BESIDE_MEANS if averaged else 1.0)
-    significant = p_value < level and strongest.gain >= worth
-    if not significant and not _is_far_off(inquiry, fit):
+    least = _least_gains(inquiry, selection, fit)
+    left = _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT)
+    other = _other_law(inquiry, selection, fit, least["force"])
+    if other is not None:
+        return other
+    if not left and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
+    strongest = max(left, key=lambda leftover: leftover.gain) if left else None
+    worth = least["force"] if strongest is None else least[strongest.shape.kind]
     resembles, named = _beyond(inquiry, selection, fit, worth)
-    if not significant:
+    if strongest is None:
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
-    forces = [leftover for leftover in found if leftover.shape.kind != "resonance"]
+    forces = [leftover for leftover in left if leftover.shape.kind != "resonance"]
+    if not forces:
+        named = fit if named is None else _without_superfluous(inquiry, selection, named)
+        return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     widest = max(forces, key=lambda leftover: leftover.gain)
     stood_in, spread = with_curve(inquiry.fitter, inquiry.setting, fit, widest)
     if named is not None and named.log_likelihood > stood_in.log_likelihood:
@@ -144,6 +152,21 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
         if selection.evidence(inquiry.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
             return remaining(inquiry, selection, selection.without(fit, effect), shapes)
     return Rest(stood_in, widest, p_value, True, resembles, spread)
+
+
+def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, float]:
+    """What a leftover of each kind must gain [nats]."""
+    averaged = any(recording.periods > 1 for recording in inquiry.recordings)
+    share = LEFTOVER_SHARE * (fit.motion_likelihood - selection.nominal.motion_likelihood)
+    curve = max(LEFTOVER_GAIN, share) * (BESIDE_MEANS if averaged else 1.0)
+    return {"force": curve, "friction": curve, "gain": curve, "resonance": max(SWING_GAIN, share)}
+
+
+def _significant(found: list[Leftover], p_value: float, least: Mapping[str, float], level: float) -> list[Leftover]:
+    """Leftovers that are no chance, and large enough; none where the most significant one may be chance."""
+    if p_value >= level:
+        return []
+    return [left for left in found if left.p_value < level and left.gain >= least[left.shape.kind]]
 
 
 def _beyond(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
@@ -160,6 +183,29 @@ def _beyond(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> t
     good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
     ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
     return tuple(ordered), good[ordered[0]] if ordered else None
+
+
+def _other_law(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> Rest | None:
+    """What remains with a law from beyond the vocabulary in the place of a named one; None if that gains little."""
+    best, most = None, worth
+    for effect in fit.effects:
+        law = richer(fit, effect)
+        if law is not None:
+            effects, starts = law
+            begins = [Hypothesis.of(inquiry.setting, effects, start) for start in starts]
+            start = inquiry.fitter.likeliest(begins, fit.levels, 1)[0]
+            found = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels), rounds=2)
+            gain = selection.evidence(fit, found)
+            taken = gain > most
+            reason = f"explains {'more' if taken else 'hardly more'} in the place of {effect}"
+            selection.considered.append(Candidate(effects[-1], gain, taken, reason))
+            if taken:
+                best, most = found, gain
+    if best is None:
+        return None
+    p_value = float(stats.chi2.sf(2.0 * most, len(best.hypothesis.cube) - len(fit.hypothesis.cube)))
+    best = _without_superfluous(inquiry, selection, best)
+    return Rest(best, None, p_value, True, (best.effects[-1],), np.zeros(0))
 
 
 def _is_far_off(inquiry: Inquiry, fit: Fit) -> bool:

@@ -16,6 +16,8 @@ CONTAINS = {  # rich law: the simple one that it can always imitate
     "speed_limit": "saturation",
     "payload_event": "payload",
 }
+CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer one from beyond it
+SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
 SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
 BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
@@ -42,6 +44,21 @@ def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None
     here = [e for e in beside if e.startswith(f"{site}/")]
     excluded = simple in beside or any(CONTAINS.get(kind) in effect_of(e, plant).excludes for e in here)
     return None if excluded else simple
+
+
+def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
+    """The effects of a fit with a law from beyond the vocabulary, the last, in the place of one that it contains.
+
+    With values to start from; None where no such law is known.
+    """
+    site, _, kind = effect.partition("/")
+    if kind not in CONTAINED_IN:
+        return None
+    law = f"{site}/{CONTAINED_IN[kind]}"
+    values = fit.hypothesis.values
+    kept = {name.replace(effect, law): value for name, value in values.items() if name.startswith(f"{effect}.")}
+    starts = [{**values, **kept, **{f"{law}.{symbol}": value for symbol, value in shape.items()}} for shape in SHAPES]
+    return (*(e for e in fit.effects if e != effect), law), starts
 
 
 def simple_values(fit: Fit) -> dict[str, float]:

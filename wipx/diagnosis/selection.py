@@ -73,7 +73,7 @@ class Selection:
             best = self.preferred(extended, current)
             if best is not None:
                 current = self.caught_up(current, best)
-                best = self._worth_it(current, [best, *extended])
+                best = self._worth_it(current, [best, *(found for found in extended if found is not best)])
             if best is None:
                 self._remember(current, extended, None)
                 best = self._pair(current, extended)
@@ -91,10 +91,14 @@ class Selection:
                     )
                 )
                 break
+            told = len(self.considered)
             self._remember(current, extended, best)
             pruned = self.pruned(self.settled(best))
             if len(pruned.effects) == len(current.effects) and self._lead(pruned, current) < LEAST_LEAD:
-                break  # another effect in the place of one, and hardly better
+                del self.considered[told:]
+                reason = "hardly better in the place of one that is there"
+                self.considered.append(Candidate(best.effects[-1], self.evidence(current, best), False, reason))
+                break
             current = pruned
         return self.exchanged(current)
 
@@ -137,10 +141,11 @@ class Selection:
     def _worth_it(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The first fit whose further effect is worth it, or the simple law of a rich one that is not; None without."""
         for found in extended:
-            plain = None if self.worthwhile(current, found) else self.plainer(found, found.effects[-1])
-            chosen = found if plain is None else plain
-            if self.worthwhile(current, chosen):
-                return chosen
+            if self.worthwhile(current, found):
+                return found
+            plain = self.plainer(found, found.effects[-1])
+            if plain is not None and self.worthwhile(current, plain):
+                return plain
         return None
 
     def plainer(self, fit: Fit, effect: str) -> Fit | None:

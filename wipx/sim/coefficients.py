@@ -254,6 +254,19 @@ def _joint(f: _Filler, site: str, j: int) -> None:
             "v_s": R.PEAK_SPEED + j,
         },
     )
+    _replace(
+        f,
+        f"{site}/hysteresis",
+        R.ON_HYSTERESIS + j,
+        {
+            "stiffness": R.BRISTLE + j,
+            "damping": R.BRISTLE_DAMPING + j,
+            "F_c": R.SLIDING + j,
+            "n": R.EXPONENT + j,
+            "gamma": R.GAMMA + j,
+        },
+    )
+    f.present[R.ON_BRISTLE + j] |= f.present[R.ON_HYSTERESIS + j]
     if f.present[R.ON_BRISTLE + j]:
         f.present[R.ON_DAMPING] = True
         # A bristle without a level slides at once; from rest it would first be a spring.

@@ -10,6 +10,7 @@ Brogliato 2008, Numerical Methods for Nonsmooth Dynamical Systems, ch. 10).
 
 from wipx.core.law import clip, inlined, law, maximum
 from wipx.effects import lagged_stribeck, load_friction, quadratic_drag, sticky_spot, stribeck
+from wipx.effects.hysteresis import yielding
 from wipx.effects.presliding import bristle, bristle_rate
 from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
@@ -50,19 +51,7 @@ def smooth_friction(S, on, j):
         for w in range(W):
             S[(R.FORCE + j) * W + w] += quadratic_drag.force(S[v + w], S[(R.DRAG + j) * W + w])
     if on[R.ON_BRISTLE + j]:
-        for w in range(W):
-            sliding, speed = S[(R.SLIDING + j) * W + w], abs(S[v + w])
-            level = sliding + stribeck.bump(speed, S[(R.PEAK + j) * W + w], sliding, S[(R.PEAK_SPEED + j) * W + w])
-            stiffness, damping = S[(R.BRISTLE + j) * W + w], S[(R.BRISTLE_DAMPING + j) * W + w]
-            rate = bristle_rate(speed, stiffness, level)
-            h = S[R.STEP * W + w]
-            z = S[(R.Z + j) * W + w]
-            kept, gain, mean_gain = bristle(rate * h)
-            # The force is linear in the mean rate of the step, which is solved for below.
-            S[(R.FORCE + j) * W + w] -= (stiffness - damping * rate) * gain * z
-            S[(R.DAMPING + j) * W + w] += stiffness * mean_gain * h + damping * gain
-            S[(R.BRISTLE_KEPT + j) * W + w] = kept
-            S[(R.BRISTLE_GAIN + j) * W + w] = gain * h
+        bend(S, on, j)
     if on[R.ON_REMAINDER + j]:
         remainder(S, j)
     if on[R.ON_SWING + j]:
@@ -89,6 +78,28 @@ def smooth_friction(S, on, j):
             after = steady + rest * S[(R.PAPER_KEPT + j) * W + w]
             S[(R.PAPER + j) * W + w] = after if S[R.STEP * W + w] > 0.0 else before
             S[(R.FORCE + j) * W + w] -= steady + rest * S[(R.PAPER_MEAN + j) * W + w]
+
+
+@inlined
+def bend(S, on, j):
+    """The force of a bristle on joint j, linear in the rate of the step, and how it will bend."""
+    v = (R.RATE + j) * W
+    for w in range(W):
+        sliding, speed = S[(R.SLIDING + j) * W + w], abs(S[v + w])
+        level = sliding + stribeck.bump(speed, S[(R.PEAK + j) * W + w], sliding, S[(R.PEAK_SPEED + j) * W + w])
+        stiffness, damping = S[(R.BRISTLE + j) * W + w], S[(R.BRISTLE_DAMPING + j) * W + w]
+        rate = bristle_rate(speed, stiffness, level)
+        h = S[R.STEP * W + w]
+        z = S[(R.Z + j) * W + w]
+        if on[R.ON_HYSTERESIS + j]:
+            bent = (z + 0.5 * h * S[v + w]) * stiffness / maximum(level, 1e-12)
+            rate *= yielding(bent, S[v + w], S[(R.EXPONENT + j) * W + w], S[(R.GAMMA + j) * W + w])
+        kept, gain, mean_gain = bristle(rate * h)
+        # The force is linear in the mean rate of the step, which is solved for below.
+        S[(R.FORCE + j) * W + w] -= (stiffness - damping * rate) * gain * z
+        S[(R.DAMPING + j) * W + w] += stiffness * mean_gain * h + damping * gain
+        S[(R.BRISTLE_KEPT + j) * W + w] = kept
+        S[(R.BRISTLE_GAIN + j) * W + w] = gain * h
 
 
 @inlined
