@@ -17,7 +17,7 @@ EFFECT = Effect(
         Parameter("n", "exponent, how suddenly it yields", "ratio", 1.0, 1.0, 8.0, 2.0, grid=(2.0,)),
         Parameter(
             "gamma",
-            "how much less stiff it is while it builds up than while it goes back, -1/2 to 1/2",
+            "stiffness of the way back: 1/2 as at rest, 0 up to twice that, -1/2 three times",
             "ratio",
             0.0,
             -0.5,
