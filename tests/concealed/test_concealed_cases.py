@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wipx.concealed.cases import TIERS, Choice, difference_over_noise, draw_case, noise_of, realise, stratified
+from wipx.concealed.cases import TIERS, Choice, choose, difference_over_noise, draw_case, noise_of, realise, stratified
 from wipx.concealed.logging import record
 from wipx.concealed.oddities import draw_oddity, oddity_names
 from wipx.concealed.physics import Hidden, physics
@@ -88,6 +88,14 @@ def test_where_nothing_is_missing_the_robot_is_the_nominal_one():
     assert case.hidden == Hidden()
     assert case.parameters == case.robot.parameters
     assert not case.uncertainty
+
+
+def test_effects_that_no_recording_tells_apart_are_not_hidden_together(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    drawn = [set(choose(rng, "triple").names) for _ in range(400)]
+    assert any({"environment/spring", "pitch/viscous"} <= names for names in drawn)
+    for alike in (("environment/spring", "environment/rail_tilt"), ("geometry/com_offset", "sensor_theta/bias")):
+        assert not any(names >= set(alike) for names in drawn)
 
 
 def test_a_wrong_parameter_is_listed_as_uncertain():

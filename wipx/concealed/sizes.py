@@ -272,7 +272,7 @@ _FAMILIES = {
     "limit": ("saturation", "speed_limit"),
     "play": ("dead_zone", "backlash"),
     "inclination": ("com_offset", "rail_tilt", "bias"),
-    "constant pull": ("rail_tilt", "spring"),  # a tilt moves the place at which a spring rests, and does nothing else
+    "constant pull": ("rail_tilt", "spring"),  # a tilt moves the place where a spring rests, and hardly anything else
     "mass": ("payload", "payload_event", "inertia"),
     "scale": ("gain", "scale"),
 }
