@@ -84,16 +84,22 @@ def smooth_friction(S, on, j):
 def bend(S, on, j):
     """The force of a bristle on joint j, linear in the rate of the step, and how it will bend."""
     v = (R.RATE + j) * W
+    if on[R.ON_HYSTERESIS + j]:
+        for w in range(W):
+            bent = S[(R.Z + j) * W + w] + 0.5 * S[R.STEP * W + w] * S[v + w]
+            share = bent * S[(R.BRISTLE + j) * W + w] / maximum(S[(R.SLIDING + j) * W + w], 1e-12)
+            exponent, gamma = S[(R.EXPONENT + j) * W + w], S[(R.GAMMA + j) * W + w]
+            S[(R.YIELDING + j) * W + w] = yielding(share, S[v + w], exponent, gamma)
+    else:
+        for w in range(W):
+            S[(R.YIELDING + j) * W + w] = 1.0
     for w in range(W):
         sliding, speed = S[(R.SLIDING + j) * W + w], abs(S[v + w])
         level = sliding + stribeck.bump(speed, S[(R.PEAK + j) * W + w], sliding, S[(R.PEAK_SPEED + j) * W + w])
         stiffness, damping = S[(R.BRISTLE + j) * W + w], S[(R.BRISTLE_DAMPING + j) * W + w]
-        rate = bristle_rate(speed, stiffness, level)
+        rate = S[(R.YIELDING + j) * W + w] * bristle_rate(speed, stiffness, level)
         h = S[R.STEP * W + w]
         z = S[(R.Z + j) * W + w]
-        if on[R.ON_HYSTERESIS + j]:
-            bent = (z + 0.5 * h * S[v + w]) * stiffness / maximum(level, 1e-12)
-            rate *= yielding(bent, S[v + w], S[(R.EXPONENT + j) * W + w], S[(R.GAMMA + j) * W + w])
         kept, gain, mean_gain = bristle(rate * h)
         # The force is linear in the mean rate of the step, which is solved for below.
         S[(R.FORCE + j) * W + w] -= (stiffness - damping * rate) * gain * z

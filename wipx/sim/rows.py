@@ -59,13 +59,13 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     M11, M12, M22, COUPLING_NOW, GRAVITY_NOW,
     W11, W12, W22, YIELD, YIELD1, NEXT, NEXT1,  # inverse of the mass matrix, rates at the end
     FORCE, FORCE1, DAMPING, DAMPING1, PLUS, PLUS1, MINUS, MINUS1,
-    BRISTLE_KEPT, BRISTLE_KEPT1, BRISTLE_GAIN, BRISTLE_GAIN1,
+    BRISTLE_KEPT, BRISTLE_KEPT1, BRISTLE_GAIN, BRISTLE_GAIN1, YIELDING, YIELDING1,
     SHOWN, SHOWN1,  # coordinates as the sensors show them
     MEASURED, MEASURED1, MEASURED_RATE, MEASURED_RATE1,  # what the controller works with
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 65)  # fmt: skip
+) = range(N_STATES, N_STATES + 67)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 
