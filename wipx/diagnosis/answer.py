@@ -4,7 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from wipx.core.diagnosis import Alternative, Combined, Diagnosis, FoundEffect, NextExperiment, Unexplained, Verdict
+from wipx.core.diagnosis import (
+    Alternative,
+    Candidate,
+    Combined,
+    Diagnosis,
+    FoundEffect,
+    NextExperiment,
+    Unexplained,
+    Verdict,
+)
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words
 from wipx.diagnosis.combined import combined
@@ -58,7 +67,7 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
         fit=fitted,
         held_out=held_out,
         unexplained=unexplained,
-        candidates=tuple(selection.considered),
+        candidates=tuple(_in_hindsight(candidate, fit) for candidate in selection.considered),
         bounds=bounds(selection.prospects_of(fit), inquiry.log.plant),
         weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
@@ -68,6 +77,11 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
         combined=as_one,
     )
     return replace(draft, sentence=sentence(draft))
+
+
+def _in_hindsight(candidate: Candidate, fit: Fit) -> Candidate:
+    """A candidate, chosen only if it is still part of the answer."""
+    return replace(candidate, chosen=candidate.chosen and set(candidate.name.split(" + ")) <= set(fit.effects))
 
 
 def _effects(

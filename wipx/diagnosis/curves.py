@@ -18,7 +18,6 @@ OVER_RATE = (
     "presliding",
     "quadratic_drag",
     "asymmetric_coulomb",
-    "hysteresis",
     "lugre",
     "back_emf",
 )
@@ -78,7 +77,6 @@ def _force(kind: str, p: Mapping[str, float], at: np.ndarray, radius: float, bod
         "back_emf": lambda: -p["k_e"] * at,
         "coulomb": lambda: -p["F_c"] * np.sign(at),
         "presliding": lambda: -p["F_c"] * np.sign(at),
-        "hysteresis": lambda: -p["F_c"] * np.sign(at),
         "stribeck": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
         "lugre": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
         "quadratic_drag": lambda: -p["c"] * at * np.abs(at),

@@ -133,8 +133,10 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     place = f" at {site_in_words(left.site, kind)}" if left.site else ""
     shape = f": {left.shape}" if left.shape else ""
     sentence = f"A significant part is left over{place}{aside} that no effect of the vocabulary explains{shape}."
-    if left.resembles:
-        sentence += f" It resembles {' or '.join(effect_in_words(name, kind) for name in left.resembles)}."
+    named = {effect.name for effect in diagnosis.effects}
+    others = [effect_in_words(name, kind) for name in left.resembles if name not in named]
+    if others:
+        sentence += f" It resembles {' or '.join(others)}."
     return sentence
 
 
