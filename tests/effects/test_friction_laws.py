@@ -45,7 +45,7 @@ def test_hysteresis_with_exponent_one_and_no_asymmetry_is_presliding():
 
 
 @given(st.floats(1.0, 4.0), st.floats(-0.5, 0.5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_hysteresis_follows_the_equation_of_bouc_and_wen(exponent: float, gamma: float):
     level, stiffness, pull, pulse = 0.5, 10.0, 3.0, 12.0
     values = {"F_c": level, "stiffness": stiffness, "n": exponent, "gamma": gamma}
