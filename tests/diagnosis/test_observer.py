@@ -73,8 +73,8 @@ def test_noise_levels_come_back(fresh_seed: int):
     start = NoiseLevels(5.0 * LEVELS.force, LEVELS.sensor)
     fitter = Fitter(case.fitter.follower)
     levels = fitter.levels_of(fitter.fit(Hypothesis.of(case.setting, (), {}), start))
-    # The search ends at steps of 0.375 of the logarithm, beyond which less than 0.3 nats are gained.
-    assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.4)
+    # Recordings of this length tell the logarithm within a standard deviation of 0.14; the search ends within 0.2.
+    assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.2 + 4.5 * 0.14)
 
 
 @pytest.mark.parametrize("kind", ["linear_axis", "wip"])

@@ -42,7 +42,7 @@ class Rest:
 
     Attributes:
         fit: Of the effects that are kept, and of a curve that stands in for the rest where there is one.
-        strongest: What is left over; None where nothing significant is.
+        strongest: What is left over; None where no test of a force finds anything significant.
         p_value: That it is nothing, corrected for the number of places looked at.
         significant: Whether it is something.
         resembles: Effects beyond the vocabulary that would explain it.
@@ -125,13 +125,13 @@ def _rival_that_transfers(
 
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
-    found = leftovers(inquiry.fitter, fit, shapes)
-    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
     least = _least_gains(inquiry, selection, fit)
-    left = _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT)
     other = _other_law(inquiry, selection, fit, least["force"])
     if other is not None:
         return other
+    found = leftovers(inquiry.fitter, fit, shapes)
+    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
+    left = _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT)
     if not left and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
     strongest = max(left, key=lambda leftover: leftover.gain) if left else None

@@ -263,15 +263,16 @@ def _among_four(state, joints):
 def _begin(covariance, sensor, time, k):
     """At the first row the state is hardly known; once it has settled, as well as the sensors tell.
 
-    Coordinates are then known within some noise, rates within that over 20 ms.
+    Coordinates are then known within some noise, rates within that over 20 ms; `sensor` has the variances of the
+    coordinates, shape (L, joints).
     """
-    levels, recordings = len(sensor), time.shape[1]
+    (levels, joints), recordings = sensor.shape, time.shape[1]
     for r in range(recordings):
         if k == 0 or time[k - 1, r] <= SETTLES < time[k, r]:
             factor = DIFFUSE if k == 0 else 1.0
             covariance[:, :, r::recordings] = 0.0
             for level in range(levels):
-                for j in range(len(covariance) // 2):
+                for j in range(joints):
                     covariance[j, j, level * recordings + r] = 9.0 * factor * sensor[level, j]
                     covariance[2 + j, 2 + j, level * recordings + r] = 9.0 * factor * sensor[level, j] / 0.02**2
 
@@ -314,7 +315,7 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
     half, root = np.zeros((m, 4, lanes)), np.zeros((m, lanes))
     inverse, gain = np.zeros((m, m, lanes)), np.zeros((4, m, lanes))
     for k in range(rows):
-        _begin(covariance, sensor, time, k)
+        _begin(covariance, sensor[:, :joints], time, k)
         for c in range(m):
             i = _among_four(channels[c], joints)
             j, delay = (i + 2, late[channels[c]]) if i < 2 else (i, 0.0)

@@ -236,36 +236,11 @@ def _joint(f: _Filler, site: str, j: int) -> None:
     )
     if f.present[[R.ON_SPOT, R.ON_LOAD + j]].any():
         f.present[R.ON_FRICTION] = True
-    _replace(
-        f,
-        f"{site}/presliding",
-        R.ON_BRISTLE + j,
-        {"stiffness": R.BRISTLE + j, "damping": R.BRISTLE_DAMPING + j, "F_c": R.SLIDING + j},
-    )
-    _replace(
-        f,
-        f"{site}/lugre",
-        R.ON_BRISTLE + j,
-        {
-            "stiffness": R.BRISTLE + j,
-            "damping": R.BRISTLE_DAMPING + j,
-            "F_c": R.SLIDING + j,
-            "F_s": R.PEAK + j,
-            "v_s": R.PEAK_SPEED + j,
-        },
-    )
-    _replace(
-        f,
-        f"{site}/hysteresis",
-        R.ON_HYSTERESIS + j,
-        {
-            "stiffness": R.BRISTLE + j,
-            "damping": R.BRISTLE_DAMPING + j,
-            "F_c": R.SLIDING + j,
-            "n": R.EXPONENT + j,
-            "gamma": R.GAMMA + j,
-        },
-    )
+    bristle = {"F_c": R.SLIDING + j, "stiffness": R.BRISTLE + j, "damping": R.BRISTLE_DAMPING + j}
+    peak, shape = {"F_s": R.PEAK + j, "v_s": R.PEAK_SPEED + j}, {"n": R.EXPONENT + j, "gamma": R.GAMMA + j}
+    _replace(f, f"{site}/presliding", R.ON_BRISTLE + j, bristle)
+    _replace(f, f"{site}/lugre", R.ON_BRISTLE + j, {**bristle, **peak})
+    _replace(f, f"{site}/hysteresis", R.ON_HYSTERESIS + j, {**bristle, **shape})
     f.present[R.ON_BRISTLE + j] |= f.present[R.ON_HYSTERESIS + j]
     if f.present[R.ON_BRISTLE + j]:
         f.present[R.ON_DAMPING] = True

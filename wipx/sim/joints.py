@@ -86,10 +86,11 @@ def bend(S, on, j):
     v = (R.RATE + j) * W
     if on[R.ON_HYSTERESIS + j]:
         for w in range(W):
-            bent = S[(R.Z + j) * W + w] + 0.5 * S[R.STEP * W + w] * S[v + w]
-            share = bent * S[(R.BRISTLE + j) * W + w] / maximum(S[(R.SLIDING + j) * W + w], 1e-12)
             exponent, gamma = S[(R.EXPONENT + j) * W + w], S[(R.GAMMA + j) * W + w]
-            S[(R.YIELDING + j) * W + w] = yielding(share, S[v + w], exponent, gamma)
+            per_way = S[(R.BRISTLE + j) * W + w] / maximum(S[(R.SLIDING + j) * W + w], 1e-12)
+            share, way = per_way * S[(R.Z + j) * W + w], 0.5 * S[R.STEP * W + w] * S[v + w]
+            middle = share + per_way * (way - abs(way) * share * yielding(share, way, exponent, gamma))
+            S[(R.YIELDING + j) * W + w] = yielding(middle, way, exponent, gamma)
     else:
         for w in range(W):
             S[(R.YIELDING + j) * W + w] = 1.0
