@@ -1,4 +1,4 @@
-"""Speed and memory of simulator, identification, diagnosis, estimators and controllers, beside physics engines.
+"""Speed and memory of all parts, beside physics engines.
 
 Times are processor times, which other work on the machine disturbs little; compare the ratios
 of one run. The figures are also written to runs/bench/bench.json.
@@ -15,6 +15,7 @@ from engines import measure_engines
 from estimators import measure_estimators
 from identification import measure_identification
 from kernel import measure_compilation, measure_kernel
+from recordings import measure_recordings
 
 RESULTS = Path("runs/bench/bench.json")
 
@@ -32,6 +33,7 @@ def main() -> None:
         "diagnosis": measure_diagnosis(),
         "estimators": measure_estimators(),
         "controllers": measure_controllers(),
+        "recordings": measure_recordings(),
     }
     RESULTS.parent.mkdir(parents=True, exist_ok=True)
     RESULTS.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
