@@ -8,7 +8,7 @@ EFFECT = Effect(
     kind="presliding",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("F_c", "level in steady sliding", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02, 0.1)),
+        Parameter("F_c", "level in steady sliding", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02, 0.1, 0.5)),
         Parameter("stiffness", "of the bristle", "stiffness", 1.0, 1e-2, 1e5, 100.0, grid=(1.0, 10.0, 100.0)),
         Parameter("damping", "of the bristle", "damping", 0.0, 0.0, 3.0, 0.0, default=0.0),
     ),
