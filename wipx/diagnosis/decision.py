@@ -25,7 +25,7 @@ BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more o
 LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
 SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has nine
 LEFTOVER_SHARE = 0.02  # and of what is explained
-BESIDE_MEANS = 1.5  # times as much a curve where the log has means of commands only, which answer to noise within a row
+BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 UNSETTLED = 3.0  # times what the simulator's step moves a size, below which that size is numerics
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
@@ -158,8 +158,9 @@ def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, 
     """What a leftover of each kind must gain [nats]."""
     averaged = any(recording.periods > 1 for recording in inquiry.recordings)
     share = LEFTOVER_SHARE * (fit.motion_likelihood - selection.nominal.motion_likelihood)
-    curve = max(LEFTOVER_GAIN, share) * (BESIDE_MEANS if averaged else 1.0)
-    return {"force": curve, "friction": curve, "gain": curve, "resonance": max(SWING_GAIN, share)}
+    factor = BESIDE_MEANS if averaged else 1.0
+    curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
+    return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
 
 
 def _significant(found: list[Leftover], p_value: float, least: Mapping[str, float], level: float) -> list[Leftover]:
