@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow check bench lock clean
+.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -69,6 +69,9 @@ test: $(READY)  ## run the tests (without the slow ones)
 
 test-slow: $(READY)  ## run the slow tests
 	$(PY) -m pytest -q -m slow
+
+test-bounds: $(READY)  ## run the tests with compiled code that checks its indices (slow)
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q -n auto -m "not slow"
 
 check: $(READY)  ## lint, formatting and types
 	$(PY) -m ruff check

@@ -16,7 +16,7 @@ def test_hysteresis_is_not_taken_for_bristles(fresh_seed: int):
     assert answer.unexplained.p_value < 1e-4
     assert answer.model.value("translation/hysteresis.F_c") == pytest.approx(0.8, rel=0.05)
     for column, nominal in answer.held_out.nominal.items():  # its memory at the start of a prediction is not known
-        assert answer.held_out.completed[column] < 0.7 * nominal
+        assert answer.held_out.completed[column] < 0.9 * nominal
 
 
 @pytest.mark.parametrize("damping", [0.0, 1.0])

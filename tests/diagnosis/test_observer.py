@@ -1,6 +1,10 @@
 """The observer is the Kalman filter of the robot: gains, innovations, and nothing added where it does nothing."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +34,14 @@ from wipx.sim.inputs import Inputs
 
 DT = 0.004  # [s]
 LEVELS = NoiseLevels(np.array([0.02]), np.array([1e-4]))  # [N s^0.5, m]
+FOLLOW = """
+import sys
+from diagnosis.recorded import bench
+from wipx.diagnosis.leftover import leftovers, shapes_of
+case = bench(sys.argv[1], {}, 0, duration=0.2)
+fit = case.fit()
+leftovers(case.fitter, fit, shapes_of(case.fitter, fit))
+"""
 
 
 def pushed_carriage(rng: np.random.Generator, rows: int = 3000) -> Bench:
@@ -75,6 +87,16 @@ def test_noise_levels_come_back(fresh_seed: int):
     levels = fitter.levels_of(fitter.fit(Hypothesis.of(case.setting, (), {}), start))
     # Recordings of this length tell the logarithm within a standard deviation of 0.14; the search ends within 0.2.
     assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.2 + 4.5 * 0.14)
+
+
+@pytest.mark.parametrize("kind", ["pendulum", "double_pendulum"])
+def test_loops_stay_within_their_arrays(kind: str):
+    """Compiled code does not check its indices; the same code does when it is not compiled."""
+    search = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    command = [sys.executable, "-c", FOLLOW, kind]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": search}
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
 
 
 @pytest.mark.parametrize("kind", ["linear_axis", "wip"])
