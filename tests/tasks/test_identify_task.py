@@ -82,14 +82,18 @@ def test_bounds_may_be_whole_numbers(program, folder, tmp_path: Path):
     assert (answer.status, answer.error) == (0, "")
 
 
+def heeds_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_an_interrupted_search_leaves_one_line_and_no_file(folder, tmp_path: Path):
     endless = ("optimizer=pso", "optimizer.iterations=1000000", "tracking=none", "task=identify")
     command = [sys.executable, "-m", "wipx", *endless, f"recordings.path={folder.path}", "hydra.run.dir=out"]
     source = Path(__file__).resolve().parents[2]
     environment = {**os.environ, "PYTHONPATH": str(source)}
-    with subprocess.Popen(
-        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as run:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # A shell's background job, and so its children, would ignore the signal.
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=heeds_interrupts, **pipes) as run:
         time.sleep(6.0)  # in the search; a start takes one to three seconds
         assert run.poll() is None
         run.send_signal(signal.SIGINT)
