@@ -24,9 +24,19 @@ SINGLE: dict[str, tuple[str, Effects]] = {
     "drag": ("linear_axis", {"translation/quadratic_drag": {"c": 1.0}}),
     "Stribeck": ("pendulum", {"pitch/stribeck": {"F_c": 0.03, "F_s": 0.06, "v_s": 0.3}}),
     "unactuated": ("cartpole", {"pitch/coulomb": {"F_c": 0.01}}),
+    "play": ("linear_axis", {"actuator/backlash": {"gap": 6e-3, "drive_inertia": 0.2, "returned": 1.0}}),
     "elbow": ("double_pendulum", {"joint2/viscous": {"sigma": 0.05}}),
 }
-QUICK = {"damping", "dead zone", "delay", "spring", "drag", "Stribeck", "elbow"}  # of `SINGLE`, one of each family
+QUICK = {
+    "damping",
+    "dead zone",
+    "delay",
+    "spring",
+    "drag",
+    "Stribeck",
+    "play",
+    "elbow",
+}  # of `SINGLE`, one of each family
 SIMPLE: dict[str, tuple[str, Effects]] = {
     "wip": ("wip", {"translation/coulomb": {"F_c": 0.5}}),
     "pendulum": ("pendulum", {"pitch/coulomb": {"F_c": 0.03}}),

@@ -196,6 +196,18 @@ def test_backlash_gives_no_force_while_crossing_and_full_force_in_contact(gap: f
     assert np.count_nonzero(free) >= 5
 
 
+def test_soft_flanks_pass_the_force_on_later_and_none_of_it_is_lost():
+    hard = {"gap": 1e-3, "drive_inertia": 0.2, "drive_damping": 0.0}
+    commands = np.where(T[:-1] < 0.1, 3.0, -3.0)
+    contact_time = 2.5e-3
+    late = forces_of({"actuator/backlash": {**hard, "contact_time": contact_time}}, commands)
+    prompt = forces_of({"actuator/backlash": hard}, commands)
+    impulse = np.cumsum(prompt - late) * (T[1] - T[0])
+    # The force falls from 3 N to nothing in the gap, then to -3 N in contact; both changes are a time constant late.
+    assert impulse[T[1:] <= 0.1][-1] == pytest.approx(0.0, abs=1e-9)
+    assert impulse[-1] == pytest.approx(-6.0 * contact_time, rel=1e-6)
+
+
 def test_a_gap_of_zero_is_no_backlash():
     model = robot("wip", {"actuator/backlash": {"gap": 0.0, "drive_inertia": 0.3, "drive_damping": 0.0}})
     start = (0.0, 0.05, 0.0, 0.0)

@@ -38,6 +38,7 @@ def test_a_slower_log_has_the_mean_of_the_commands_and_the_rows_between_are_gone
     assert logged_slower(fast, 1) is fast
 
 
+@pytest.mark.slow
 def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(program, tmp_path: Path):
     answer = program("task=pipeline", *SHORT, "hydra.run.dir=out")
     assert answer.status == 0, answer.error

@@ -10,10 +10,9 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.answer import answered, proposed
-from wipx.diagnosis.decision import confirmed, remaining
+from wipx.diagnosis.decision import decided
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.inquiry import Inquiry
-from wipx.diagnosis.leftover import shapes_of
 from wipx.diagnosis.sanity import check_plausible
 from wipx.diagnosis.selection import Selection
 from wipx.diagnosis.suspects import asked, check_suspects
@@ -105,9 +104,7 @@ def diagnose(
     watcher("looking for combinations", 0.3)
     chosen = selection.run()
     watcher("what is left over", 0.6)
-    chosen = confirmed(inquiry, selection, chosen)
-    shapes = shapes_of(fitter, chosen)
-    rest = remaining(inquiry, selection, chosen, shapes)
+    rest, shapes = decided(inquiry, selection, chosen)
     watcher("held-out recordings", 0.75)
     answer = answered(inquiry, selection, rest, shapes)
     watcher("next experiment", 0.9)

@@ -7,11 +7,12 @@ import numpy as np
 from scipy import stats
 
 from wipx.core.diagnosis import Candidate
+from wipx.diagnosis import rough
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
-from wipx.diagnosis.leftover import Leftover, Shape, leftovers
+from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.nested import richer
 from wipx.diagnosis.numbers import shift_by_step
 from wipx.diagnosis.screening import prospects
@@ -57,8 +58,38 @@ class Rest:
     spread: np.ndarray
 
 
-def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
-    """Without effects that change no prediction to speak of, or do not transfer to held-out recordings."""
+def decided(inquiry: Inquiry, selection: Selection, chosen: Fit) -> tuple[Rest, list[Shape]]:
+    """What is kept of the effects that the selection chose, what they leave over, and the shapes it was looked for in.
+
+    Small effects that held-out predictions do not show are kept where something is left without them and nothing
+    with them: what is left is no small print of another law then.
+    """
+    told = len(selection.considered)
+    kept = confirmed(inquiry, selection, chosen)
+    shapes = shapes_of(inquiry.fitter, kept)
+    rest = remaining(inquiry, selection, kept, shapes)
+    if not rest.significant or len(kept.effects) == len(chosen.effects):
+        return rest, shapes
+    dropped = selection.considered[told:]
+    del selection.considered[told:]
+    more = confirmed(inquiry, selection, chosen, visible=-np.inf)
+    if set(more.effects) > set(kept.effects):
+        whole = remaining(inquiry, selection, more, shapes)
+        if not whole.significant:
+            return whole, shapes
+    selection.considered[told:] = dropped
+    return rest, shapes
+
+
+def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float = VISIBLE) -> Fit:
+    """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
+
+    Args:
+        inquiry: The means.
+        selection: The search that chose the effects.
+        fit: Of the effects.
+        visible: Share of the squared error of held-out predictions that a small effect must remove.
+    """
     if not fit.effects:
         return fit
     repeated = transfer(inquiry.fitter, fit)
@@ -78,19 +109,19 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
             reason = "is as small as what the step of the simulation changes"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < VISIBLE:
+        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
             rival = _rival_that_transfers(inquiry, selection, fit, effect, repeated, gain)
             if rival is not None:
                 reason = "held-out recordings contradict it, and not what is in its place"
                 selection.considered.append(Candidate(effect, gain, False, reason))
-                return confirmed(inquiry, selection, rival)
+                return confirmed(inquiry, selection, rival, visible)
             continue
         selection.considered.append(Candidate(effect, gain, False, reason))
         plain = selection.plainer(fit, effect)
         worth = plain is not None and selection.worthwhile(reduced, plain)
-        return confirmed(inquiry, selection, plain if plain is not None and worth else reduced)
+        return confirmed(inquiry, selection, plain if plain is not None and worth else reduced, visible)
     return fit
 
 
@@ -157,7 +188,8 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
 def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, float]:
     """What a leftover of each kind must gain [nats]."""
     averaged = any(recording.periods > 1 for recording in inquiry.recordings)
-    share = LEFTOVER_SHARE * (fit.motion_likelihood - selection.nominal.motion_likelihood)
+    share = rough.SHARE if rough.is_rough(fit) else LEFTOVER_SHARE
+    share *= fit.motion_likelihood - selection.nominal.motion_likelihood
     factor = BESIDE_MEANS if averaged else 1.0
     curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}

@@ -10,6 +10,7 @@ from wipx.core.plant import Plant
 from wipx.core.results import Estimate
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.robust import covariance
+from wipx.diagnosis.rough import alike
 from wipx.diagnosis.screening import Prospect
 from wipx.effects.catalogue import effect_of
 
@@ -31,8 +32,9 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     values = space.to_values(cube)
     doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
     deviation = np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
-    low = space.to_values(np.maximum(cube - NINETY_FIVE * deviation, 0.0))
-    high = space.to_values(np.minimum(cube + NINETY_FIVE * deviation, 1.0))
+    as_good = alike(fitter, fit, explained)
+    low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
+    high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
     # A number without any influence may be anything.
     blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
     return tuple(

@@ -88,7 +88,8 @@ def linearise_along(model: Model, log: Log) -> Linearisation:
         states[i, :, 2 + 2 * i] -= REACH
     rest = _accelerations(ModelBatch(probed), states.reshape(2 * joints, 1, -1))
     rest = rest.reshape(joints, len(places), 1 + 4 * joints)
-    a = np.moveaxis((rest[:, :, 1::2] - rest[:, :, 2::2]) / (2.0 * REACH), 1, 0)
+    slopes = (rest[:, :, 1::2] - rest[:, :, 2::2]) / (2.0 * REACH)
+    a = np.ascontiguousarray(np.moveaxis(slopes, 1, 0))
     # A known damping at a known rate is a known force: the difference that it makes shows the mass matrix.
     b = np.zeros((len(places), joints, joints))
     moving = np.zeros((2 * joints, 1, len(places)))

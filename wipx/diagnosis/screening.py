@@ -17,6 +17,7 @@ from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Setting
 from wipx.diagnosis.limits import saturations, speed_limits
 from wipx.diagnosis.places import ripples, sticky_spots
+from wipx.diagnosis.play import plays
 from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
@@ -28,7 +29,9 @@ SCANS: dict[str, Callable[[Fitter, Fit, np.ndarray], np.ndarray]] = {
     "sticky_spot": sticky_spots,
     "saturation": saturations,
     "speed_limit": speed_limits,
+    "backlash": plays,
 }  # first guesses that take more than a grid
+AS_THEY_ARE = ("backlash",)  # guesses that no dose makes better: what a gap does is not proportional to it
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = Fals
     found: list[Prospect] = []
     for name, effect in known.items():
         if effect.beyond == beyond and not _excluded(name, effect, present, known):
-            found += _looked_at(fitter, setting, fit, name, effect)
+            found += prospects_of_effect(fitter, setting, fit, name)
     return sorted(found, key=lambda prospect: -prospect.gain)
 
 
@@ -94,7 +97,9 @@ def undosed(setting: Setting, name: str) -> list[dict[str, float]]:
     return [dict(zip(names, atom, strict=True)) for atom in atoms]
 
 
-def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Effect) -> list[Prospect]:
+def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> list[Prospect]:
+    """Where to start for one effect that could be added to a fit."""
+    effect = vocabulary(setting.nominal.plant)[name]
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
     base = fit.white.ravel()
@@ -113,7 +118,7 @@ def _looked_at(fitter: Fitter, setting: Setting, fit: Fit, name: str, effect: Ef
         slope, size = change @ left, np.sum(change**2, axis=1)
         for i, atom in enumerate(part):
             dose = 1.0
-            if grown.any():
+            if grown.any() and effect.kind not in AS_THEY_ARE:
                 dose = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
             values = np.where(grown, neutral + dose * (atom - neutral), atom)
             if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):

@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wipx.core.diagnosis import Candidate
+from wipx.diagnosis import rough
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.nested import simple_law, simple_values, simpler
 from wipx.diagnosis.robust import inflation
-from wipx.diagnosis.screening import Prospect, prospects, undosed
+from wipx.diagnosis.screening import SCANS, Prospect, prospects, prospects_of_effect, undosed
 
 MOST_EFFECTS = 8
 FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill up what nothing explains
@@ -128,7 +129,7 @@ class Selection:
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
         overstated = inflation(larger, self.fitter.follower.log, indices)
-        share = min(LEAST_SHARE * explained, MOST_ASKED)
+        share = min((rough.SHARE if rough.is_rough(smaller) else LEAST_SHARE) * explained, MOST_ASKED)
         return float(overstated * (penalty + max(LEAST_GAIN, share)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
@@ -186,16 +187,29 @@ class Selection:
         return again
 
     def settled(self, fit: Fit) -> Fit:
-        """A fit, or a better one of the same effects that a search with louder forces leads to.
+        """A fit, or a better one of the same effects that another search leads to.
 
-        Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother.
+        Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother. Where the
+        likelihood of an effect has many peaks, the highest may be another one beside further effects.
         """
         louder = replace(fit.levels, force=LOUDER * fit.levels.force)
-        again = self.fitter.polished(self.fitter.fit(fit.hypothesis, louder))
+        found = [self.fitter.polished(self.fitter.fit(fit.hypothesis, louder))]
+        moved = rough.explored(self.fitter, fit)
+        if moved is not fit:
+            found.append(self.fitter.polished(moved))
+        if len(fit.effects) > 1:
+            found += [self._begun_anew(fit, effect) for effect in fit.effects if effect.partition("/")[2] in SCANS]
+        again = max(found, key=lambda each: each.log_likelihood)
         if again.log_likelihood < fit.log_likelihood + 1.0:
             return fit
         self._fits[frozenset(fit.effects)] = again
         return again
+
+    def _begun_anew(self, fit: Fit, effect: str) -> Fit:
+        """A fit of the same effects, for which one of them starts from where the others leave it room."""
+        base = self.without(fit, effect)
+        starts = sorted(prospects_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
+        return self.fitter.polished(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
 
     def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
         """The fit with the most evidence beyond a base, or a simpler one that is as good."""
@@ -217,7 +231,9 @@ class Selection:
         if key not in self._fits:
             values = {**simple_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
-            self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
+            self._fits[key] = self.fitter.polished(
+                rough.explored(self.fitter, self.fitter.fit(hypothesis, start.levels))
+            )
         return self._fits[key]
 
     def pruned(self, fit: Fit) -> Fit:
@@ -288,7 +304,7 @@ class Selection:
         values = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
         begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start}) for start in values]
         likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
-        fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
+        fits = [rough.explored(self.fitter, self.fitter.fit(begin, fit.levels, steps=5)) for begin in likeliest]
         return max(fits, key=lambda f: f.log_likelihood)
 
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:

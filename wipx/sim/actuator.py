@@ -116,6 +116,10 @@ def backlash(S, j):
             S[R.RETURNED * W + w],
             S[R.STEP * W + w],
         )
+        passed = passed if gap > 0.0 else force
+        rest = S[(R.PASSED + j) * W + w] - passed if begun and gap > 0.0 else 0.0
         S[(R.PLACE + j) * W + w] = place
         S[(R.DRIVE_SPEED + j) * W + w] = speed
-        S[(R.DRIVE + j) * W + w] = passed if gap > 0.0 else force
+        if S[R.STEP * W + w] > 0.0:
+            S[(R.PASSED + j) * W + w] = passed + rest * S[R.CONTACT_KEPT * W + w]
+        S[(R.DRIVE + j) * W + w] = passed + rest * S[R.CONTACT_MEAN * W + w]

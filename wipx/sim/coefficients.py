@@ -16,6 +16,7 @@ from wipx.effects.payload import loaded
 from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
 
+HARDEST = 1e-30  # [s]; flanks that pass a force on at once
 FASTEST_LAG = 1e-12  # [s]; a lag of zero is one that settles at once
 
 
@@ -198,6 +199,9 @@ def _actuator(f: _Filler) -> None:
         ),
     ):
         _replace(f, name, flag, targets)
+    backlash = f.values("actuator/backlash")
+    if backlash is not None:
+        f.rows[R.CONTACT_RATE] = 1.0 / np.maximum(backlash["contact_time"], HARDEST)
     lag = f.values("actuator/lag")
     if lag is not None:
         f.present[R.ON_LAG] = True

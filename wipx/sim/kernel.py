@@ -151,6 +151,11 @@ def set_step(S, on, counts, s):
             kept, mean = relaxing(S[R.STEP * W + w] * S[R.LAG_RATE * W + w])
             S[R.LAG_KEPT * W + w] = kept
             S[R.LAG_MEAN * W + w] = mean
+    if on[R.ON_BACKLASH]:
+        for w in range(W):
+            kept, mean = relaxing(S[R.STEP * W + w] * S[R.CONTACT_RATE * W + w])
+            S[R.CONTACT_KEPT * W + w] = kept
+            S[R.CONTACT_MEAN * W + w] = mean
     for j in range(2):
         if on[R.ON_PAPER + j]:
             for w in range(W):

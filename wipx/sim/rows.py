@@ -14,7 +14,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     ROTOR, ROTOR1,
     BALANCE, TILT, TILT_FORCE, SPRING, SPRING_REST,
     INPUT_GAIN, DELAY, OFFSET, DEAD_BAND, GAIN, FORCE_MAX, STALL, FREE_SPEED, BACK_EMF, LAG_RATE,
-    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING, RETURNED,
+    RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING, RETURNED, CONTACT_RATE,
     VISCOUS, VISCOUS1, DRAG, DRAG1,
     LEVEL_PLUS, LEVEL_PLUS1, LEVEL_MINUS, LEVEL_MINUS1,
     STATIC, STATIC1, COULOMB, COULOMB1, STRIBECK_SPEED, STRIBECK_SPEED1,
@@ -31,7 +31,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     SMOOTHING, SMOOTHING1,  # speed over which dry friction builds up, 0 for sticking
     BIAS, BIAS1, SCALE, SCALE1, SENSOR_DELAY, SENSOR_DELAY1,
     N_COEFFICIENTS,
-) = range(127)  # fmt: skip
+) = range(128)  # fmt: skip
 
 # State of a rollout, carried from step to step.
 (
@@ -40,17 +40,18 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     Z, Z1,  # bristles
     PAPER, PAPER1,  # lagged friction
     LAGGED, LAGGED1,  # actuator
-    PLACE, PLACE1, DRIVE_SPEED, DRIVE_SPEED1,  # backlash
+    PLACE, PLACE1, DRIVE_SPEED, DRIVE_SPEED1, PASSED, PASSED1,  # backlash
     MADE, MADE1, LIGHTNESS, LIGHTNESS1,  # accelerations in the last step: by the drive, and by a force of one
     SWING_PLACE, SWING_PLACE1, SWING_RATE, SWING_RATE1,
     STARTED,  # 0 before the first step, then 1
     N_STATES,
-) = range(N_COEFFICIENTS, N_COEFFICIENTS + 26)  # fmt: skip
+) = range(N_COEFFICIENTS, N_COEFFICIENTS + 28)  # fmt: skip
 
 # Scratch of one step.
 (
     STEP, PER_STEP, ROW_STEP, TIME,
-    LAG_KEPT, LAG_MEAN, PAPER_KEPT, PAPER_KEPT1, PAPER_MEAN, PAPER_MEAN1,  # of lags over one step
+    LAG_KEPT, LAG_MEAN, CONTACT_KEPT, CONTACT_MEAN,
+    PAPER_KEPT, PAPER_KEPT1, PAPER_MEAN, PAPER_MEAN1,  # of lags over one step
     MID, MID1, RATE, RATE1,  # coordinates and rates in mid-step
     COMMAND, COMMAND1, DRIVE, DRIVE1,  # command now, and the force that comes of it
     SPREAD, SPREAD1,  # half width of the single commands about their mean
@@ -65,7 +66,7 @@ W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instea
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
     N_ROWS,
-) = range(N_STATES, N_STATES + 67)  # fmt: skip
+) = range(N_STATES, N_STATES + 69)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 

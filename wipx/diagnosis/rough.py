@@ -1,0 +1,88 @@
+"""Search by trial where the likelihood is rough.
+
+A drive that meets its flank a step earlier or later makes small kinks in the likelihood, between which slopes over
+small steps lead nowhere. Trials at random distances, ever smaller, see what the kinks hide (an evolution strategy with
+a given schedule: Beyer, Schwefel 2002, Natural Computing 1).
+"""
+
+import numpy as np
+
+from wipx.diagnosis.fitting import Fit, Fitter
+
+ROUGH = ("backlash",)
+RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
+WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
+ALONG = 2.0  # times that, along the ridge
+LEAST = 0.02  # of the search interval, that a number counts at least
+TRIALS = 40  # at each width
+FACTORS = np.geomspace(1.0 / 8.0, 8.0, 10)  # along the ridge, that are looked at for as good a fit
+CHANCE = 1.92  # nats, half of the 95 % quantile of chi squared with one degree of freedom
+SHARE = 0.05  # of what is explained, that a law leaves open which others follow roughly only
+MOST = 80.0  # nats of it
+
+
+def is_rough(fit: Fit) -> bool:
+    """Whether a fit has an effect that makes the likelihood rough."""
+    return any(effect.partition("/")[2] in ROUGH for effect in fit.effects)
+
+
+def explored(fitter: Fitter, fit: Fit) -> Fit:
+    """A fit, or a better one at the same noise with other numbers of its rough effects, where it has any."""
+    if not is_rough(fit):
+        return fit
+    space = fit.hypothesis.space
+    rough, ridge, powers = _numbers(fit)
+    least = np.array([LEAST * (space.free[i].high - space.free[i].low) for i in rough])
+    rng = np.random.default_rng(0)
+    best, cost = fit.hypothesis.cube, _costs(fitter, fit, fit.hypothesis.cube[None])[0]
+    for width in WIDTHS:
+        values = np.repeat(space.to_values(best[None]), TRIALS, axis=0)
+        size = width * np.maximum(np.abs(values[:, rough]), least)
+        values[:, rough] += size * rng.standard_normal(size.shape)
+        values[:, ridge] *= np.exp(ALONG * width * rng.standard_normal((TRIALS, 1)) * powers)
+        trials = space.to_cube(np.maximum(values, space.to_values(np.zeros(len(best)))))
+        costs = _costs(fitter, fit, trials)
+        if costs.min() < cost:
+            best, cost = trials[int(costs.argmin())], float(costs.min())
+    found = fitter.fit(fit.hypothesis.at(best), fit.levels)
+    return found if found.log_likelihood > fit.log_likelihood else fit
+
+
+def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
+    """Positions in the cube along the ridge that explain the recordings about as well as a fit, itself included.
+
+    Args:
+        fitter: Of the fit.
+        fit: The fit.
+        explained: What it explains [nats].
+
+    Returns:
+        Shape (at least 1, D).
+    """
+    found = [fit.hypothesis.cube]
+    if is_rough(fit):
+        space = fit.hypothesis.space
+        _, ridge, powers = _numbers(fit)
+        least = fit.log_likelihood - float(np.clip(SHARE * explained, CHANCE, MOST))
+        for factor in FACTORS:
+            values = space.to_values(fit.hypothesis.cube)
+            values[ridge] *= factor**powers
+            there = fitter.fit(fit.hypothesis.at(space.to_cube(values)), fit.levels, steps=3)
+            if there.log_likelihood >= least:
+                found.append(there.hypothesis.cube)
+    return np.array(found)
+
+
+def _numbers(fit: Fit) -> tuple[list[int], list[int], np.ndarray]:
+    """Indices of the rough effects' numbers, of those along the ridge, and the powers with which these change there."""
+    names = fit.hypothesis.space.names
+    rough = [i for e in fit.effects if e.partition("/")[2] in ROUGH for i in fit.hypothesis.parameters_of(e)]
+    ridge = [i for i in rough if names[i].rpartition(".")[2] in RIDGE]
+    return rough, ridge, np.array([1.0 if names[i].endswith(f".{RIDGE[0]}") else -1.0 for i in ridge])
+
+
+def _costs(fitter: Fitter, fit: Fit, cubes: np.ndarray) -> np.ndarray:
+    """Negative log-likelihoods, up to a constant [nats]."""
+    space = fit.hypothesis.space
+    priors = np.sum(space.prior_residuals(cubes) ** 2, axis=1)
+    return 0.5 * (np.sum(fitter.white_of(fit, space.batch(cubes)) ** 2, axis=1) + priors)
