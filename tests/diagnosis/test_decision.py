@@ -7,6 +7,7 @@ from diagnosis.recorded import bench
 from wipx.core.plant import plant_of
 from wipx.diagnosis import decision
 from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.inquiry import Inquiry
 from wipx.diagnosis.nested import simple_law
 
 WIP = plant_of("wip")
@@ -31,3 +32,12 @@ def test_a_rich_law_has_a_simple_one_where_there_is_room():
     assert simple_law("pitch/presliding", ("pitch/coulomb",), WIP) is None
     assert simple_law("pitch/sticky_spot", ("pitch/stribeck",), WIP) is None  # which excludes Coulomb friction
     assert simple_law("pitch/viscous", (), WIP) is None
+
+
+def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
+    robot = bench("linear_axis", hidden, fresh_seed)
+    monkeypatch.setattr(Inquiry, "heldout_gain", lambda self, repeated, reduced: 0.0)  # nothing shows
+    answer = robot.diagnosed()
+    assert {effect.name for effect in answer.effects} == set(hidden)
+    assert answer.verdict == "mismatch"

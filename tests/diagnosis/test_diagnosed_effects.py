@@ -24,19 +24,9 @@ SINGLE: dict[str, tuple[str, Effects]] = {
     "drag": ("linear_axis", {"translation/quadratic_drag": {"c": 1.0}}),
     "Stribeck": ("pendulum", {"pitch/stribeck": {"F_c": 0.03, "F_s": 0.06, "v_s": 0.3}}),
     "unactuated": ("cartpole", {"pitch/coulomb": {"F_c": 0.01}}),
-    "play": ("linear_axis", {"actuator/backlash": {"gap": 6e-3, "drive_inertia": 0.2, "returned": 1.0}}),
     "elbow": ("double_pendulum", {"joint2/viscous": {"sigma": 0.05}}),
 }
-QUICK = {
-    "damping",
-    "dead zone",
-    "delay",
-    "spring",
-    "drag",
-    "Stribeck",
-    "play",
-    "elbow",
-}  # of `SINGLE`, one of each family
+QUICK = {"damping", "dead zone", "delay", "spring", "drag", "Stribeck", "elbow"}  # of `SINGLE`, one of each family
 SIMPLE: dict[str, tuple[str, Effects]] = {
     "wip": ("wip", {"translation/coulomb": {"F_c": 0.5}}),
     "pendulum": ("pendulum", {"pitch/coulomb": {"F_c": 0.03}}),
@@ -114,6 +104,11 @@ def test_the_simplest_law_is_preferred(name: str, fresh_seed: int):
     assert {rival.name for rival in answer.effects[0].rivals}.isdisjoint(
         f"{site}/{law}" for site in nominal_model(kind).plant.joints for law in ("stribeck", "presliding")
     )
+
+
+def test_a_spring_and_its_damping_are_no_soft_bristle(fresh_seed: int):
+    truth = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 0.5, "x0": 0.0}}
+    assert_found(bench("linear_axis", truth, fresh_seed).diagnosed(), truth)
 
 
 @pytest.mark.slow

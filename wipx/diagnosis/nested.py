@@ -6,7 +6,7 @@ from wipx.core.plant import Plant
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.robust import covariance
-from wipx.effects.catalogue import effect_of
+from wipx.effects.catalogue import effect_of, vocabulary
 from wipx.identify.noise import quantisation
 
 CONTAINS = {  # rich law: the simple one that it can always imitate
@@ -16,6 +16,8 @@ CONTAINS = {  # rich law: the simple one that it can always imitate
     "speed_limit": "saturation",
     "payload_event": "payload",
 }
+# What an effect is whose memory is never tried: a bristle that does not slip is a spring, with its damping.
+PARTS = {"translation/presliding": {"environment/spring.k": "stiffness", "translation/viscous.sigma": "damping"}}
 CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer one from beyond it
 SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
 SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
@@ -46,6 +48,17 @@ def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None
     return None if excluded else simple
 
 
+def parted(fit: Fit) -> tuple[str, ...] | None:
+    """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
+    plant = fit.hypothesis.model.plant
+    for effect in fit.effects:
+        parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
+        rest = tuple(e for e in fit.effects if e != effect and e not in parts)
+        if parts and all(part in vocabulary(plant) for part in parts):
+            return (*rest, *parts)
+    return None
+
+
 def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
     """The effects of a fit with a law from beyond the vocabulary, the last, in the place of one that it contains.
 
@@ -69,6 +82,9 @@ def simple_values(fit: Fit) -> dict[str, float]:
         site, _, kind = effect.partition("/")
         if kind in CONTAINS:
             found[f"{site}/{CONTAINS[kind]}.{SYMBOLS.get(symbol, symbol)}"] = value
+    for effect, parts in PARTS.items():
+        if effect in fit.effects:
+            found.update({name: fit.hypothesis.values[f"{effect}.{symbol}"] for name, symbol in parts.items()})
     return found
 
 

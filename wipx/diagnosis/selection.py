@@ -15,7 +15,7 @@ from wipx.core.diagnosis import Candidate
 from wipx.diagnosis import rough
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.nested import simple_law, simple_values, simpler
+from wipx.diagnosis.nested import parted, simple_law, simple_values, simpler
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import SCANS, Prospect, prospects, prospects_of_effect, undosed
 
@@ -223,6 +223,10 @@ class Selection:
                 break
             best = found
             replaced = simpler(best, self.fitter.follower.log)
+        parts = parted(best)
+        if parts is not None:
+            found = self.fitted(parts, best)
+            best = found if self.score(found, base) > self.score(best, base) else best
         return best
 
     def fitted(self, effects: tuple[str, ...], start: Fit) -> Fit:
@@ -308,17 +312,23 @@ class Selection:
         return max(fits, key=lambda f: f.log_likelihood)
 
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:
+        if chosen is not None and all(found.effects != chosen.effects for found in extended):
+            extended = [chosen, *extended]
+        best = None if chosen is None else _added(current, chosen)
         for found in extended:
-            added = [effect for effect in found.effects if effect not in current.effects]
             gain = self.evidence(current, found)
             taken = chosen is not None and found.effects == chosen.effects
-            reason = _reason(found, chosen, gain, taken=taken)
-            self.considered.append(Candidate(" + ".join(added), gain, taken, reason))
+            self.considered.append(Candidate(_added(current, found), gain, taken, _reason(best, gain, taken=taken)))
 
 
-def _reason(found: Fit, chosen: Fit | None, gain: float, *, taken: bool) -> str:
+def _added(current: Fit, larger: Fit) -> str:
+    """The effects that a fit has more than the current one, in words."""
+    return " + ".join(effect for effect in larger.effects if effect not in current.effects)
+
+
+def _reason(best: str | None, gain: float, *, taken: bool) -> str:
     if taken:
         return "explains most"
-    if chosen is None:
+    if best is None:
         return "gains too little to be told from chance and from the small print of the laws"
-    return f"explains less than {chosen.effects[-1]}" if gain > 0.0 else "explains nothing"
+    return f"explains less than {best}" if gain > 0.0 else "explains nothing"

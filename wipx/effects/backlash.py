@@ -3,6 +3,7 @@
 The free drive is a mass in grease that the force moves; contact is inelastic. A share of the momentum that the
 drive gathers in the gap is handed to the joint when they meet: all of it where the drive's mass counts with that of the
 joint, so that the force is only late; none where it is lost in the frame, so that the force is missing in the gap.
+Flanks give way: what is passed on reaches the joint with a first-order lag, of which nothing is lost.
 A free drive as heavy as what it drives is outside this law: it would lose contact to the acceleration that it
 causes itself.
 """
@@ -71,7 +72,7 @@ EFFECT = Effect(
     ),
     law="0 while the drive crosses the gap, F in contact",
     linear_in=("gap",),
-    doubt=0.25,  # flanks give way, and another drive crosses the gap in another way: on others it is a third off
+    doubt=0.25,  # another drive crosses the gap in another way
     source="Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38(10)",
 )
 

@@ -1,0 +1,39 @@
+"""A drive that crosses a gap: its likelihood is rough, and the search sees beyond the kinks."""
+
+import numpy as np
+from diagnosis.recorded import bench
+
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.rough import alike, explored
+
+PLAY = "actuator/backlash"
+TRUE = {"gap": 6e-3, "drive_inertia": 0.2, "drive_damping": 0.0, "returned": 1.0, "contact_time": 0.0}
+
+
+def test_trials_lose_nothing_and_intervals_hold_drives_that_cross_alike(fresh_seed: int):
+    case = bench("linear_axis", {PLAY: TRUE}, fresh_seed)
+    nominal = case.fit()
+    near = {f"{PLAY}.{symbol}": value for symbol, value in {**TRUE, "gap": 1.3 * TRUE["gap"]}.items()}
+    slopes = case.fitter.fit(Hypothesis.of(case.setting, (PLAY,), near), nominal.levels)
+    found = explored(case.fitter, slopes)
+    assert found.log_likelihood >= slopes.log_likelihood
+    # A wide gap before a light drive is crossed as a narrow one before a heavy one.
+    places = alike(case.fitter, found, found.log_likelihood - nominal.log_likelihood)
+    gaps = found.hypothesis.space.to_values(places)[:, found.hypothesis.space.names.index(f"{PLAY}.gap")]
+    assert gaps.min() < 1.3 * TRUE["gap"]
+    assert gaps.max() > 0.7 * TRUE["gap"]
+
+
+def test_play_is_named(fresh_seed: int):
+    answer = bench("linear_axis", {PLAY: TRUE}, fresh_seed).diagnosed()
+    assert answer.verdict == "mismatch"
+    assert [effect.name for effect in answer.effects] == [PLAY]
+    gap = answer.effects[0].parameters[0]
+    assert 0.7 * gap.low <= TRUE["gap"] <= 1.3 * gap.high
+
+
+def test_a_fit_without_a_gap_is_left_as_it_is():
+    case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.5}}, seed=3)
+    fit = case.fit("translation/coulomb")
+    assert explored(case.fitter, fit) is fit
+    np.testing.assert_array_equal(alike(case.fitter, fit, 100.0), fit.hypothesis.cube[None])
