@@ -57,7 +57,7 @@ def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:
     """How large effects that were not found could be: from the sharpest look at each."""
     sharpest: dict[str, tuple[float, Bound]] = {}
     for prospect in looked_at:
-        first, value = next(iter(prospect.values.items()))
+        first, value = next(iter(prospect.values)), prospect.estimate
         if not np.isfinite(prospect.deviation):
             continue
         spec = effect_of(prospect.effect, plant).parameters[0]

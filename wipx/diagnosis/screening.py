@@ -42,13 +42,15 @@ class Prospect:
         effect: Its name.
         gain: What adding it is expected to gain, in nats.
         values: Where a fit should start, by "site/kind.symbol" [SI].
-        deviation: Standard deviation of its first number [SI]; infinite where it has a threshold.
+        estimate: Its first number, were the effect proportional to it [SI].
+        deviation: Standard deviation of that; infinite where the effect has a threshold.
     """
 
     effect: str
     gain: float
     values: Mapping[str, float]
-    deviation: float = np.inf
+    estimate: float
+    deviation: float
 
 
 def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = False) -> list[Prospect]:
@@ -117,15 +119,16 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
         change -= (change @ basis) @ basis.T
         slope, size = change @ left, np.sum(change**2, axis=1)
         for i, atom in enumerate(part):
-            dose = 1.0
-            if grown.any() and effect.kind not in AS_THEY_ARE:
-                dose = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
+            best = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
+            dose = best if grown.any() and effect.kind not in AS_THEY_ARE else 1.0
             values = np.where(grown, neutral + dose * (atom - neutral), atom)
             if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
                 continue
             gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
+            estimate = neutral[0] + best * (atom[0] - neutral[0])
             deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
-            found.append(Prospect(name, float(gain), dict(zip(names, values.tolist(), strict=True)), float(deviation)))
+            start = dict(zip(names, values.tolist(), strict=True))
+            found.append(Prospect(name, float(gain), start, float(estimate), float(deviation)))
     return found
 
 

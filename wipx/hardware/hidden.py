@@ -78,6 +78,7 @@ def rich_physics(nominal: Model, rng: np.random.Generator) -> HiddenPhysics:
         "drive_inertia": 2.2e-3 / lever**2,
         "drive_damping": rng.uniform(0.01, 0.03) / lever**2,
         "returned": 0.0,
+        "contact_time": 0.0,
     }
     return HiddenPhysics(
         nominal.with_effects(effects),
