@@ -31,6 +31,7 @@ LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 POLISHED = 3  # effects for which they are, at most
+DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
 WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
@@ -235,9 +236,7 @@ class Selection:
         if key not in self._fits:
             values = {**simple_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
-            self._fits[key] = self.fitter.polished(
-                rough.explored(self.fitter, self.fitter.fit(hypothesis, start.levels))
-            )
+            self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
         return self._fits[key]
 
     def pruned(self, fit: Fit) -> Fit:
@@ -245,12 +244,21 @@ class Selection:
         for effect in fit.effects if len(fit.effects) > 1 else ():
             rest = tuple(e for e in fit.effects if e != effect)
             smaller = self.fitted(rest, fit)
+            if self.evidence(smaller, fit) < DOUBTED * self.needed(smaller, fit):
+                smaller = self._explored(smaller)
             if not self.worthwhile(smaller, fit):
                 self.considered.append(
                     Candidate(effect, self.evidence(smaller, fit), False, "superfluous beside the others")
                 )
                 return self.pruned(smaller) if len(rest) > 1 else smaller
         return fit
+
+    def _explored(self, fit: Fit) -> Fit:
+        """A fit, or a better one of the same effects that a search by trial leads to."""
+        moved = rough.explored(self.fitter, fit)
+        if moved is not fit:
+            moved = self._fits[frozenset(fit.effects)] = self.fitter.polished(moved)
+        return moved
 
     def exchanged(self, fit: Fit) -> Fit:
         """Every effect replaced by a better one, or by itself at better values, as long as there is any."""
@@ -308,7 +316,9 @@ class Selection:
         values = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
         begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start}) for start in values]
         likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
-        fits = [rough.explored(self.fitter, self.fitter.fit(begin, fit.levels, steps=5)) for begin in likeliest]
+        fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
+        if starts[0].effect.partition("/")[2] in rough.ROUGH:
+            fits = [rough.explored(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)
 
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:
