@@ -24,7 +24,6 @@ FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill 
 LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 STICKING_SHARE = 0.05  # that bristles gain by how a joint comes to rest, where their bending is invisible
-ROUGH_MOST = 200.0  # and at most, beside a law that others follow roughly only
 MOST_ASKED = 80.0  # nats that the share asks for, at most
 CONSIDERED = 6  # effects that are fitted in each step
 PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
@@ -131,8 +130,7 @@ class Selection:
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
         overstated = inflation(larger, self.fitter.follower.log, indices)
-        is_rough = rough.is_rough(smaller)
-        share = min(rough.SHARE * explained, ROUGH_MOST) if is_rough else min(LEAST_SHARE * explained, MOST_ASKED)
+        share = min((rough.SHARE if rough.is_rough(smaller) else LEAST_SHARE) * explained, MOST_ASKED)
         return float(overstated * (penalty + max(LEAST_GAIN, share)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
