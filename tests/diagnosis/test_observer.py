@@ -178,9 +178,9 @@ def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late
             last = int(log.inputs.last[r]) + 1
             # A first state known 1e4 times worse than the sensors costs more than half of the digits.
             scale = np.abs(plain.gains).max()
-            np.testing.assert_allclose(found.gains[:last, r], plain.gains, atol=5e-4 * scale)
+            np.testing.assert_allclose(found.gains[:last, r], plain.gains, atol=2e-4 * scale)
             np.testing.assert_allclose(
-                found.whitening[:last, r] / plain.whitening.max(), plain.whitening / plain.whitening.max(), atol=5e-4
+                found.whitening[:last, r] / plain.whitening.max(), plain.whitening / plain.whitening.max(), atol=2e-4
             )
             assert not found.gains[last:, r].any()
 

@@ -4,7 +4,9 @@ import numpy as np
 from diagnosis.recorded import bench
 
 from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.play import plays
 from wipx.diagnosis.rough import alike, explored
+from wipx.diagnosis.screening import basis_of
 
 PLAY = "actuator/backlash"
 TRUE = {"gap": 6e-3, "drive_inertia": 0.2, "drive_damping": 0.0, "returned": 1.0, "contact_time": 0.0}
@@ -20,8 +22,16 @@ def test_trials_lose_nothing_and_intervals_hold_drives_that_cross_alike(fresh_se
     # A wide gap before a light drive is crossed as a narrow one before a heavy one.
     places = alike(case.fitter, found, found.log_likelihood - nominal.log_likelihood)
     gaps = found.hypothesis.space.to_values(places)[:, found.hypothesis.space.names.index(f"{PLAY}.gap")]
-    assert gaps.min() < 1.3 * TRUE["gap"]
-    assert gaps.max() > 0.7 * TRUE["gap"]
+    assert gaps.max() > 2.0 * gaps.min()
+    assert 0.7 * gaps.min() < TRUE["gap"] < 1.3 * gaps.max()
+
+
+def test_the_first_guess_crosses_about_as_the_true_drive_does(fresh_seed: int):
+    case = bench("linear_axis", {PLAY: TRUE}, fresh_seed)
+    nominal = case.fit()
+    gap, inertia, _, returned, _ = plays(case.fitter, nominal, basis_of(nominal))[0]
+    assert returned == TRUE["returned"]
+    assert 0.5 < gap * inertia / (TRUE["gap"] * TRUE["drive_inertia"]) < 2.0
 
 
 def test_play_is_named(fresh_seed: int):

@@ -37,7 +37,7 @@ PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
 LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
-LEAST_LEAD = 4.0  # nats by which a replacement must be better
+LEAST_LEAD = 4.0  # nats by which a replacement must be better, and a rich law than the simple one that it contains
 
 
 def taken_for_granted(smaller: Fit, larger: Fit) -> bool:
@@ -224,6 +224,10 @@ class Selection:
                 break
             best = found
             replaced = simpler(best, self.fitter.follower.log)
+        for effect in best.effects:
+            plain = self.plainer(best, effect)
+            if plain is not None and self.score(best, base) - self.score(plain, base) < LEAST_LEAD:
+                return plain
         parts = parted(best)
         if parts is not None:
             found = self.settled(self.fitted(parts, best))

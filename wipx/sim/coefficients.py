@@ -16,8 +16,7 @@ from wipx.effects.payload import loaded
 from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
 
-HARDEST = 1e-30  # [s]; flanks that pass a force on at once
-FASTEST_LAG = 1e-12  # [s]; a lag of zero is one that settles at once
+FASTEST_LAG = 1e-30  # [s]; a lag of zero is one that settles at once
 
 
 @dataclass(frozen=True)
@@ -201,7 +200,7 @@ def _actuator(f: _Filler) -> None:
         _replace(f, name, flag, targets)
     backlash = f.values("actuator/backlash")
     if backlash is not None:
-        f.rows[R.CONTACT_RATE] = 1.0 / np.maximum(backlash["contact_time"], HARDEST)
+        f.rows[R.CONTACT_RATE] = 1.0 / np.maximum(backlash["contact_time"], FASTEST_LAG)
     lag = f.values("actuator/lag")
     if lag is not None:
         f.present[R.ON_LAG] = True
