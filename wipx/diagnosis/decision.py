@@ -126,13 +126,18 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
 
 
 def _unsettled(inquiry: Inquiry, fit: Fit) -> list[str]:
-    """Effects whose sizes move by about as much as they are when the simulator halves its step."""
+    """Effects whose sizes move by about as much as they are when the simulator halves its step.
+
+    Rough effects are none of them: how far they move is read off slopes, which lead nowhere there.
+    """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
     settled = size > UNSETTLED * shift_by_step(inquiry.fitter, fit)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
+        if law.kind in rough.ROUGH:
+            continue
         grows = [space.names.index(f"{effect}.{symbol}") for symbol in law.linear_in]
         if grows and not settled[grows].any():
             found.append(effect)

@@ -25,7 +25,7 @@ LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
 LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
 THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
-SPREADS = (2.0, 1.4, 1.15)  # factors by which the spread of single commands is changed, in turn
+SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
 POLISHED = 0.5  # nats at which alternating ends
 
 
@@ -60,6 +60,18 @@ class Fit:
     def effects(self) -> tuple[str, ...]:
         """Effects of the hypothesis."""
         return self.hypothesis.effects
+
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """Slope of the negative log-likelihood by the position in the cube, shape (D,)."""
+        residual = np.concatenate([self.white.ravel(), self.hypothesis.space.prior_residuals(self.hypothesis.cube)[0]])
+        return self.jacobian.T @ residual
+
+    @property
+    def free(self) -> np.ndarray:
+        """Which numbers no bound keeps from better values, shape (D,)."""
+        cube = self.hypothesis.cube
+        return ~((cube <= 0.0) & (self.slope > 0.0) | (cube >= 1.0) & (self.slope < 0.0))
 
     @cached_property
     def information(self) -> np.ndarray:
@@ -145,11 +157,16 @@ class Fitter:
 
         Thresholds are tied to the spread, so the values follow it at every try.
         """
-        for factor in SPREADS if fit.levels.spread > 0.0 else ():
-            for change in (factor, 1.0 / factor):
+        for factor in (SPREAD, 1.0 / SPREAD) if fit.levels.spread > 0.0 else ():
+            change = factor
+            while True:
                 there = self._at_spread(fit, change)
-                while there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
-                    fit, there = there, self._at_spread(there, change)
+                if there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
+                    fit, change = there, change**2
+                elif change != factor:
+                    change = factor
+                else:
+                    break
         return fit
 
     def _at_spread(self, fit: Fit, change: float) -> Fit:
@@ -226,10 +243,7 @@ class Fitter:
     def _proposals(self, fit: Fit) -> np.ndarray:
         """Positions to try next, one for each damping, within the cube."""
         cube = fit.hypothesis.cube
-        residual = np.concatenate([fit.white.ravel(), fit.hypothesis.space.prior_residuals(cube)[0]])
-        slope = fit.jacobian.T @ residual
-        held = ((cube <= 0.0) & (slope > 0.0)) | ((cube >= 1.0) & (slope < 0.0))
-        free = np.flatnonzero(~held)
+        free = np.flatnonzero(fit.free)
         proposals = np.repeat(cube[None], len(DAMPINGS), axis=0)
         if not len(free):
             return proposals[:1]
@@ -237,7 +251,7 @@ class Fitter:
         scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
         scaled = normal / np.outer(scale, scale)
         for i, damping in enumerate(DAMPINGS):
-            step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), slope[free] / scale) / scale
+            step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), fit.slope[free] / scale) / scale
             proposals[i, free] -= step
         return np.clip(proposals, 0.0, 1.0)
 

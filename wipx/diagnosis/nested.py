@@ -22,6 +22,7 @@ CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer o
 SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
 SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
+HARDLY = 0.1  # of a joint's travel, bent by which a bristle hardly slips
 BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
 CERTAIN = 2.0  # standard deviations
 ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
@@ -48,15 +49,22 @@ def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None
     return None if excluded else simple
 
 
-def parted(fit: Fit) -> tuple[str, ...] | None:
+def parted(fit: Fit, log: Log) -> tuple[str, ...] | None:
     """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
     plant = fit.hypothesis.model.plant
     for effect in fit.effects:
         parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
         rest = tuple(e for e in fit.effects if e != effect and e not in parts)
-        if parts and all(part in vocabulary(plant) for part in parts):
+        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, log):
             return (*rest, *parts)
     return None
+
+
+def _hardly_slips(effect: str, fit: Fit, log: Log) -> bool:
+    """Whether a bristle bends by a good part of what its joint travels before it slips."""
+    value = fit.hypothesis.values
+    travel = float(np.ptp(log.measured[:, log.plant.joints.index(effect.partition("/")[0])][log.rows]))
+    return value[f"{effect}.F_c"] > HARDLY * travel * value[f"{effect}.stiffness"]
 
 
 def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:

@@ -5,11 +5,14 @@ small steps lead nowhere. Trials at random distances, ever smaller, see what the
 a given schedule: Beyer, Schwefel 2002, Natural Computing 1).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wipx.diagnosis.fitting import Fit, Fitter
 
 ROUGH = ("backlash",)
+DELAY, LATE = "actuator/delay", "actuator/backlash.contact_time"
 RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
 ALONG = 2.0  # times that, along the ridge
@@ -19,6 +22,23 @@ FACTORS = np.geomspace(1.0 / 8.0, 8.0, 10)  # along the ridge, that are looked a
 CHANCE = 1.92  # nats, half of the 95 % quantile of chi squared with one degree of freedom
 SHARE = 0.05  # of what is explained, that a law leaves open which others follow roughly only
 MOST = 80.0  # nats of it
+
+
+def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
+    """Whether what the laws of a fit follow roughly only may look like further effects.
+
+    It looks like others of the drive. A delay is none of them: flanks that give way are late themselves.
+    """
+    return is_rough(fit) and any(effect.startswith("actuator/") and effect != DELAY for effect in added)
+
+
+def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
+    """Values of a fit beside which a further effect is tried: its own, and where that is a delay, without a late flank.
+
+    Which of the two is late makes a flat valley, along which a fit gets stuck.
+    """
+    values = fit.hypothesis.values
+    return [values, {**values, LATE: 0.0}] if effect == DELAY and LATE in values else [values]
 
 
 def is_rough(fit: Fit) -> bool:

@@ -139,8 +139,8 @@ def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np
 
 
 def basis_of(fit: Fit) -> np.ndarray:
-    """What small changes of a fit's numbers make of its white innovations, orthonormal, shape (R m (K + 1), D)."""
-    jacobian = fit.jacobian[: fit.white.size]
+    """What small changes of a fit's free numbers make of its white innovations, orthonormal, shape (R m (K + 1), D)."""
+    jacobian = fit.jacobian[: fit.white.size, fit.free]
     if not jacobian.shape[1]:
         return np.zeros((len(jacobian), 0))
     return np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0]

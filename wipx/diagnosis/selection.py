@@ -64,6 +64,7 @@ class Selection:
     considered: list[Candidate] = field(default_factory=list)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
+    _fleeting: set[frozenset[str]] = field(default_factory=set)  # what does not transfer
     _prospects: dict[int, tuple[Fit, list[Prospect]]] = field(default_factory=dict)
 
     def run(self) -> Fit:
@@ -86,13 +87,6 @@ class Selection:
                 self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
                 current = self.pruned(self.settled(best))
                 continue
-            if len(best.effects) > FREE_EFFECTS and not self.transfers(current, best):
-                self.considered.append(
-                    Candidate(
-                        best.effects[-1], self.evidence(current, best), False, "predicts held-out recordings worse"
-                    )
-                )
-                break
             told = len(self.considered)
             self._remember(current, extended, best)
             pruned = self.pruned(self.settled(best))
@@ -130,7 +124,7 @@ class Selection:
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
         overstated = inflation(larger, self.fitter.follower.log, indices)
-        share = min((rough.SHARE if rough.is_rough(smaller) else LEAST_SHARE) * explained, MOST_ASKED)
+        share = min((rough.SHARE if rough.leaves_open(smaller, added) else LEAST_SHARE) * explained, MOST_ASKED)
         return float(overstated * (penalty + max(LEAST_GAIN, share)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
@@ -141,13 +135,17 @@ class Selection:
         return self._extensions[key]
 
     def _worth_it(self, current: Fit, extended: list[Fit]) -> Fit | None:
-        """The first fit whose further effect is worth it, or the simple law of a rich one that is not; None without."""
+        """The first fit whose further effect is worth it, or the simple law of a rich one that is not; None without.
+
+        Beyond a few effects it must also transfer to held-out recordings.
+        """
         for found in extended:
-            if self.worthwhile(current, found):
-                return found
-            plain = self.plainer(found, found.effects[-1])
-            if plain is not None and self.worthwhile(current, plain):
-                return plain
+            worth = found if self.worthwhile(current, found) else self.plainer(found, found.effects[-1])
+            if worth is None or not self.worthwhile(current, worth):
+                continue
+            if len(worth.effects) <= FREE_EFFECTS or self.transfers(current, worth):
+                return worth
+            self._fleeting.add(frozenset(worth.effects))
         return None
 
     def plainer(self, fit: Fit, effect: str) -> Fit | None:
@@ -228,7 +226,7 @@ class Selection:
             plain = self.plainer(best, effect)
             if plain is not None and self.score(best, base) - self.score(plain, base) < LEAST_LEAD:
                 return plain
-        parts = parted(best)
+        parts = parted(best, self.fitter.follower.log)
         if parts is not None:
             found = self.settled(self.fitted(parts, best))
             best = found if self.score(found, base) > self.score(best, base) else best
@@ -317,8 +315,9 @@ class Selection:
 
     def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
         effects = (*fit.effects, starts[0].effect)
-        values = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
-        begins = [Hypothesis.of(self.setting, effects, {**fit.hypothesis.values, **start}) for start in values]
+        own = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
+        values = [{**others, **start} for others in rough.beside(fit, starts[0].effect) for start in own]
+        begins = [Hypothesis.of(self.setting, effects, each) for each in values]
         likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
         fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
         if starts[0].effect.partition("/")[2] in rough.ROUGH:
@@ -332,7 +331,9 @@ class Selection:
         for found in extended:
             gain = self.evidence(current, found)
             taken = chosen is not None and found.effects == chosen.effects
-            self.considered.append(Candidate(_added(current, found), gain, taken, _reason(best, gain, taken=taken)))
+            fleeting = frozenset(found.effects) in self._fleeting
+            reason = "predicts held-out recordings worse" if fleeting else _reason(best, gain, taken=taken)
+            self.considered.append(Candidate(_added(current, found), gain, taken, reason))
 
 
 def _added(current: Fit, larger: Fit) -> str:

@@ -3,7 +3,8 @@
 The free drive is a mass in grease that the force moves; contact is inelastic. A share of the momentum that the
 drive gathers in the gap is handed to the joint when they meet: all of it where the drive's mass counts with that of the
 joint, so that the force is only late; none where it is lost in the frame, so that the force is missing in the gap.
-Flanks give way: what is passed on reaches the joint with a first-order lag, of which nothing is lost.
+Flanks give way: what is passed on reaches the joint with a first-order lag, of which nothing is lost. It is at most a
+millisecond: what takes longer is a delay or a lag of the actuator.
 A free drive as heavy as what it drives is outside this law: it would lose contact to the acceleration that it
 causes itself.
 """
@@ -65,7 +66,7 @@ EFFECT = Effect(
             "time",
             0.0,
             0.0,
-            3e-3,
+            1e-3,
             5e-4,
             default=0.0,
         ),
