@@ -20,6 +20,7 @@ def test_friction_that_differs_by_direction_is_told(fresh_seed: int):
     assert "may be one: Coulomb friction that differs by direction on the rail joint" in summary(answer)
 
 
+@pytest.mark.slow
 def test_friction_beside_a_spring_is_not(fresh_seed: int):
     hidden = {"translation/coulomb": {"F_c": 0.5}, "environment/spring": {"k": 5.0, "x0": 0.1}}
     answer = bench("wip", hidden, fresh_seed).diagnosed()

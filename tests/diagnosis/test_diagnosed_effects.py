@@ -106,6 +106,12 @@ def test_the_simplest_law_is_preferred(name: str, fresh_seed: int):
     )
 
 
+def test_a_peak_that_chance_makes_is_no_law():
+    truth = {"translation/coulomb": {"F_c": 0.5}}
+    # Noise of this seed looks like a static friction of 0.3 % more, worth half a nat beyond the penalty.
+    assert_found(bench("wip", truth, seed=1442920172).diagnosed(), truth)
+
+
 def test_a_spring_and_its_damping_are_no_soft_bristle(fresh_seed: int):
     truth = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 0.5, "x0": 0.0}}
     assert_found(bench("linear_axis", truth, fresh_seed).diagnosed(), truth)

@@ -36,6 +36,7 @@ def test_a_force_without_a_name_is_flagged_and_stood_in_for(kind: str, fresh_see
     assert np.sqrt(np.mean(shift**2)) < 0.5  # of a force of size one
 
 
+@pytest.mark.slow
 def test_dry_friction_that_changes_along_the_rail_is_flagged(fresh_seed: int):
     levels = {f"f{i}": 0.5 * (1.0 + wave) for i, wave in enumerate(WAVES)}
     wavy = {"translation/remainder": {"signal": 0.0, "factor": -1.0, "low": -0.3, "high": 0.3, **levels}}

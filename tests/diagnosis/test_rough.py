@@ -42,6 +42,15 @@ def test_play_is_named(fresh_seed: int):
     assert 0.7 * gap.low <= TRUE["gap"] <= 1.3 * gap.high
 
 
+def test_a_delay_beside_play_is_no_soft_flank(fresh_seed: int):
+    answer = bench("linear_axis", {PLAY: TRUE, "actuator/delay": {"tau": 4e-3}}, fresh_seed, count=3).diagnosed()
+    assert answer.verdict == "mismatch"
+    play, late = sorted(answer.effects, key=lambda effect: effect.name != PLAY)
+    assert play.name == PLAY
+    # Where nothing is fed back, a late sensor is a late drive.
+    assert {late.name, *late.equivalent} & {"actuator/delay", "sensor_x/delay"}
+
+
 def test_a_fit_without_a_gap_is_left_as_it_is():
     case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.5}}, seed=3)
     fit = case.fit("translation/coulomb")

@@ -129,6 +129,7 @@ def test_uncertain_numbers_make_up_for_a_suspected_size():
     assert size_of(unsure).loss < 0.1 * size_of(sure).loss
 
 
+@pytest.mark.slow
 def test_a_suspect_is_asked_about_beside_a_curve_without_a_name():
     levels = {f"f{i}": float(f) for i, f in enumerate(np.where(np.arange(KNOTS) % 2, 0.9, 0.2))}
     wavy = {"translation/remainder": {"signal": 0.0, "factor": -1.0, "low": -0.3, "high": 0.3, **levels}}

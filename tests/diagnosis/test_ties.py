@@ -26,6 +26,7 @@ def test_a_biased_sensor_is_a_shifted_centre_of_mass(hidden: dict, fresh_seed: i
     assert abs(next(iter(rival.parameters.values()))) == pytest.approx(0.01, rel=0.1)
 
 
+@pytest.mark.slow
 def test_it_is_one_beside_other_effects_too(fresh_seed: int):
     """A rival whose other numbers stop elsewhere would look far worse."""
     friction = {"pitch/stribeck": {"F_c": 0.03, "F_s": 0.06, "v_s": 0.3}}

@@ -36,6 +36,7 @@ def test_an_estimator_is_judged_on_simulated_and_on_recorded_robots(program: Pro
     assert "nothing to do" in program(*SMALL, "estimator=momentum_observer", "hydra.run.dir=job").out
 
 
+@pytest.mark.slow
 def test_a_sweep_over_lengths_gives_the_second_table(program: Program, tmp_path: Path):
     label = "label='${hydra:runtime.choices.estimator}-${task.length}'"
     sweep = program(*SMALL, "estimator=cnn1d", "estimator.epochs=3", "task.length=20,80", "name=lengths", label, "-m")

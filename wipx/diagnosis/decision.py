@@ -33,7 +33,9 @@ IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not ma
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
 MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-SMALL_PRINT = 150.0  # nats; what gains more is not taken for the small print of another law
+SMALL_PRINT = (
+    150.0  # nats; what gains more is not taken for the small print of another law or for its kinks
+)
 VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
@@ -105,7 +107,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
         # An effect that gains much and does not transfer points to something else that is missing.
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in unsettled:
+        elif effect in unsettled and (gain < SMALL_PRINT or not rough.is_rough(fit)):
             reason = "is as small as what the step of the simulation changes"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
@@ -126,18 +128,13 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
 
 
 def _unsettled(inquiry: Inquiry, fit: Fit) -> list[str]:
-    """Effects whose sizes move by about as much as they are when the simulator halves its step.
-
-    Rough effects are none of them: how far they move is read off slopes, which lead nowhere there.
-    """
+    """Effects whose sizes move by about as much as they are when the simulator halves its step."""
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
     settled = size > UNSETTLED * shift_by_step(inquiry.fitter, fit)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
-        if law.kind in rough.ROUGH:
-            continue
         grows = [space.names.index(f"{effect}.{symbol}") for symbol in law.linear_in]
         if grows and not settled[grows].any():
             found.append(effect)

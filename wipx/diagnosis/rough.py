@@ -33,12 +33,14 @@ def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
 
 
 def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
-    """Values of a fit beside which a further effect is tried: its own, and where that is a delay, without a late flank.
-
-    Which of the two is late makes a flat valley, along which a fit gets stuck.
-    """
+    """Values of a fit beside which a further effect is tried: its own, and those that do without what hides it."""
     values = fit.hypothesis.values
-    return [values, {**values, LATE: 0.0}] if effect == DELAY and LATE in values else [values]
+    return [values, {**values, LATE: 0.0}] if hides(fit, effect) else [values]
+
+
+def hides(fit: Fit, effect: str) -> bool:
+    """Whether slopes do not show what an effect would explain: late flanks have the place of a delay."""
+    return effect == DELAY and LATE in fit.hypothesis.values
 
 
 def is_rough(fit: Fit) -> bool:

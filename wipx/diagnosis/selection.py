@@ -299,10 +299,10 @@ class Selection:
         by_effect: dict[str, list[Prospect]] = {}
         for prospect in ranked:
             by_effect.setdefault(prospect.effect, []).append(prospect)
-        if not ranked or ranked[0].gain < WORTHLESS:
-            return []
-        leading = [name for name in by_effect if by_effect[name][0].gain >= max(PROMISING * ranked[0].gain, WORTHLESS)]
-        fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading[:CONSIDERED]]
+        least = max(PROMISING * ranked[0].gain, WORTHLESS) if ranked else WORTHLESS
+        leading = [name for name in by_effect if by_effect[name][0].gain >= least][:CONSIDERED]
+        leading += [name for name in by_effect if rough.hides(fit, name) and name not in leading]
+        fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
         fits.sort(key=lambda f: -self.score(f, fit))
         gains = [self.evidence(fit, f) for f in fits]
         polished = []

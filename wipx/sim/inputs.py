@@ -27,6 +27,10 @@ class Inputs:
     last: np.ndarray
     ramps: np.ndarray | None = None
 
+    def __post_init__(self) -> None:
+        # The kernel is compiled anew for every layout in memory.
+        object.__setattr__(self, "t", np.ascontiguousarray(self.t))
+
     @classmethod
     def of(
         cls,
