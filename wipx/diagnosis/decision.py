@@ -33,9 +33,7 @@ IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not ma
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
 MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-SMALL_PRINT = (
-    150.0  # nats; what gains more is not taken for the small print of another law or for its kinks
-)
+SMALL_PRINT = 150.0  # nats; what gains more is neither the small print of another law nor its kinks
 VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
