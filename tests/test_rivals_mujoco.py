@@ -100,8 +100,8 @@ def test_a_positive_pitch_falls_as_in_the_analytic_simulator(mujoco: Any):
 @pytest.mark.parametrize(
     ("kind", "name", "value"),
     [
-        ("linear_axis", "translation/viscous.sigma", 1.5),
-        ("linear_axis", "translation/coulomb.F_c", 0.8),
+        pytest.param("linear_axis", "translation/viscous.sigma", 1.5, marks=pytest.mark.slow),
+        pytest.param("linear_axis", "translation/coulomb.F_c", 0.8, marks=pytest.mark.slow),
         ("pendulum", "pitch/coulomb.F_c", 0.15),
     ],
 )

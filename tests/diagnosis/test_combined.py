@@ -6,6 +6,7 @@ from diagnosis.recorded import bench
 from wipx.report.diagnosis_summary import summary
 
 
+@pytest.mark.slow
 def test_friction_that_differs_by_direction_is_told(fresh_seed: int):
     hidden = {"translation/asymmetric_coulomb": {"F_plus": 0.3, "F_minus": 0.8}}
     answer = bench("wip", hidden, fresh_seed, count=4).diagnosed()

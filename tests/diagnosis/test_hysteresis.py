@@ -6,6 +6,7 @@ from diagnosis.recorded import bench
 BRISTLES = {"F_c": 0.8, "stiffness": 20.0}
 
 
+@pytest.mark.slow
 def test_hysteresis_is_not_taken_for_bristles(fresh_seed: int):
     hidden = {"translation/hysteresis": {**BRISTLES, "n": 2.0, "gamma": 0.2}}
     answer = bench("linear_axis", hidden, fresh_seed).diagnosed()

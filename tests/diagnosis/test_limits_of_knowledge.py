@@ -69,6 +69,7 @@ def test_an_uncertain_mass_is_corrected_beside_an_effect():
     assert answer.corrected[0].value == pytest.approx(5.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_wrong_mass_that_is_said_to_be_exact_is_a_mismatch(well_known: Recordings):
     answer = Bench(wrong_mass(1.08), well_known, {}).diagnosed()
     assert answer.verdict != "consistent"

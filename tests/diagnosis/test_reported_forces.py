@@ -23,6 +23,7 @@ def reporting(
     return tuple(Recording(r.name, {**r.columns, "u_measured": force(r)}, r.source, r.periods) for r in recordings)
 
 
+@pytest.mark.slow
 def test_a_reported_force_tells_a_late_drive_from_a_late_sensor(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     silent = recorded("linear_axis", {"actuator/delay": {"tau": DELAY}}, fresh_seed)

@@ -45,6 +45,7 @@ def answer() -> Diagnosis:
     )
 
 
+@pytest.mark.slow
 def test_suspects_do_not_change_the_answer(answer: Diagnosis):
     silent, asked = (diagnosis_json(diagnosis) for diagnosis in (axis().diagnosed(), answer))
     assert silent["suspects"] == []

@@ -27,7 +27,12 @@ def fresh() -> TrainingSet:
     return robots(1000, seed=1)
 
 
-@pytest.fixture(scope="module", params=SMALL)
+QUICK = ("gru", "cnn1d")
+
+
+@pytest.fixture(
+    scope="module", params=[kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in SMALL]
+)
 def made(request: pytest.FixtureRequest, training: TrainingSet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a trained network of each kind."""
     folder = tmp_path_factory.mktemp(request.param)
@@ -71,6 +76,7 @@ def test_units_are_the_networks_own_business(training: TrainingSet, tmp_path: Pa
     assert millimetres.card.half_width == pytest.approx(metres.card.half_width * degrees, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_training_stops_early_and_keeps_the_best_weights(training: TrainingSet, tmp_path: Path):
     recipe = replace(TINY, epochs=100, patience=3, learning_rate=0.02, annealed=False)
     told: list[float] = []
