@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wipx.core.model import ModelBatch
+from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.observer import Gains, NoiseLevels
@@ -123,7 +123,7 @@ class Fitter:
             fit: Where to start.
         """
         fixed = len(fit.levels.force)
-        levels = self._with_spread(fit)
+        levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
         centre = best = _logarithms(levels)
         free = [i for i in range(len(best)) if i != fixed]
@@ -142,15 +142,14 @@ class Fitter:
                 best = trials[int(gains.argmax())]
         return _levels(best, levels)
 
-    def _with_spread(self, fit: Fit) -> NoiseLevels:
-        """The levels of a fit, with a first guess of the spread where it matters."""
-        log = self.follower.log
-        kinds = {name.partition("/")[2] for name in fit.hypothesis.model.effects}
-        averaged = any(recording.periods > 1 for recording in log.recordings)
+    def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
+        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
+        kinds = {name.partition("/")[2] for name in model.effects}
+        averaged = any(recording.periods > 1 for recording in self.follower.log.recordings)
         matters = averaged and not kinds.isdisjoint(THRESHOLDS)
-        if matters == (fit.levels.spread > 0.0):
-            return fit.levels
-        return replace(fit.levels, spread=1.0 if matters else 0.0)
+        if matters == (levels.spread > 0.0):
+            return levels
+        return replace(levels, spread=1.0 if matters else 0.0)
 
     def _with_best_spread(self, fit: Fit) -> Fit:
         """A fit with the spread of single commands that suits it best, where it has one.

@@ -5,7 +5,7 @@ freed of what the numbers already in the model can imitate, is compared with the
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -104,6 +104,7 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
     effect = vocabulary(setting.nominal.plant)[name]
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
+    fit = replace(fit, levels=fitter.spread_for(model, fit.levels))
     base = fit.white.ravel()
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)

@@ -318,8 +318,9 @@ class Selection:
         own = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
         values = [{**others, **start} for others in rough.beside(fit, starts[0].effect) for start in own]
         begins = [Hypothesis.of(self.setting, effects, each) for each in values]
-        likeliest = self.fitter.likeliest(begins, fit.levels, STARTS)
-        fits = [self.fitter.fit(begin, fit.levels, steps=5) for begin in likeliest]
+        levels = self.fitter.spread_for(begins[0].model, fit.levels)
+        likeliest = self.fitter.likeliest(begins, levels, STARTS)
+        fits = [self.fitter.fit(begin, levels, steps=5) for begin in likeliest]
         if starts[0].effect.partition("/")[2] in rough.ROUGH:
             fits = [rough.explored(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)
