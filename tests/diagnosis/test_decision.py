@@ -1,13 +1,14 @@
-"""What is named at last: no size that is numerics, and no rich law where a simple one has the same physics."""
+"""What is named at last: no size that may be nothing, no swing that means feign, no rich law without need."""
 
 import numpy as np
 import pytest
-from diagnosis.recorded import bench
+from diagnosis.recorded import Bench, bench, slow
 
 from wipx.core.plant import plant_of
-from wipx.diagnosis import decision
+from wipx.diagnosis import decision, numbers
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.leftover import Leftover, Shape
 from wipx.diagnosis.nested import simple_law
 
 WIP = plant_of("wip")
@@ -20,10 +21,25 @@ def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: 
     def all_of_it(fitter: Fitter, fit: Fit) -> np.ndarray:
         return np.abs(fit.hypothesis.cube - fit.hypothesis.space.neutral)
 
-    monkeypatch.setattr(decision, "shift_by_step", all_of_it)
+    monkeypatch.setattr(numbers, "shift_by_step", all_of_it)
     answer = robot.diagnosed()
     assert "translation/viscous" not in {effect.name for effect in answer.effects}
-    assert any(c.reason == "is as small as what the step of the simulation changes" for c in answer.candidates)
+    assert any(c.reason == "has a size that may as well be nothing" for c in answer.candidates)
+
+
+@pytest.mark.parametrize(("averaged", "verdict"), [(False, "unexplained"), (True, "consistent")])
+def test_means_of_commands_may_feign_what_swings(
+    averaged: bool, verdict: str, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
+):
+    def seeming(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+        shape = next(shape for shape in shapes if shape.kind == "resonance")
+        return [Leftover(shape, 100.0, 1e-12, np.zeros((fit.white.size, 2)))]
+
+    monkeypatch.setattr(decision, "leftovers", seeming)
+    robot = bench("linear_axis", {}, fresh_seed)
+    means = slow(robot.recordings, np.random.default_rng(fresh_seed))
+    answer = Bench(robot.nominal, means if averaged else robot.recordings, {}).diagnosed()
+    assert answer.verdict == verdict  # the law of a resonance, fitted, gains nothing in either log
 
 
 def test_a_rich_law_has_a_simple_one_where_there_is_room():

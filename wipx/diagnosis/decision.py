@@ -14,7 +14,7 @@ from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.nested import richer
-from wipx.diagnosis.numbers import shift_by_step
+from wipx.diagnosis.numbers import deviations
 from wipx.diagnosis.screening import prospects
 from wipx.diagnosis.selection import LEAST_GAIN, Selection
 from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
@@ -28,7 +28,7 @@ SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has 
 LEFTOVER_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
-UNSETTLED = 3.0  # times what the simulator's step moves a size, below which that size is numerics
+CERTAIN = 3.0  # standard deviations by which a size must differ from nothing
 IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
@@ -97,7 +97,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
     without = {effect: selection.without(fit, effect) for effect in fit.effects}
     gains = {effect: selection.evidence(without[effect], fit) for effect in fit.effects}
     leading = max(gains, key=lambda effect: gains[effect])
-    unsettled = _unsettled(inquiry, fit)
+    uncertain = _uncertain(inquiry, selection, fit)
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
         change = predicted - np.concatenate(inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings))
@@ -105,8 +105,8 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
         # An effect that gains much and does not transfer points to something else that is missing.
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in unsettled and (gain < SMALL_PRINT or not rough.is_rough(fit)):
-            reason = "is as small as what the step of the simulation changes"
+        elif effect in uncertain and (gain < SMALL_PRINT or not rough.is_rough(fit)):
+            reason = "has a size that may as well be nothing"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
         elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < visible:
@@ -125,16 +125,20 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
     return fit
 
 
-def _unsettled(inquiry: Inquiry, fit: Fit) -> list[str]:
-    """Effects whose sizes move by about as much as they are when the simulator halves its step."""
+def _uncertain(inquiry: Inquiry, selection: Selection, fit: Fit) -> list[str]:
+    """Effects none of whose sizes is known to differ from nothing.
+
+    Beside chance, halving the simulator's step may move a size by as much as it is, and innovations that stay coloured
+    add up to more than their likelihood tells.
+    """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
-    settled = size > UNSETTLED * shift_by_step(inquiry.fitter, fit)
+    known = size > CERTAIN * deviations(inquiry.fitter, fit, selection.nominal)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
         grows = [space.names.index(f"{effect}.{symbol}") for symbol in law.linear_in]
-        if grows and not settled[grows].any():
+        if grows and not known[grows].any():
             found.append(effect)
     return found
 
@@ -171,6 +175,8 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
     if strongest is None:
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
     forces = [leftover for leftover in left if leftover.shape.kind != "resonance"]
+    if not forces and named is None and _has_means(inquiry):  # which feign what swings; its law does not confirm it
+        return Rest(fit, None, p_value, False, (), np.zeros(0))
     if not forces:
         named = fit if named is None else _without_superfluous(inquiry, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
@@ -187,12 +193,16 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
 
 def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, float]:
     """What a leftover of each kind must gain [nats]."""
-    averaged = any(recording.periods > 1 for recording in inquiry.recordings)
     share = rough.SHARE if rough.is_rough(fit) else LEFTOVER_SHARE
     share *= fit.motion_likelihood - selection.nominal.motion_likelihood
-    factor = BESIDE_MEANS if averaged else 1.0
+    factor = BESIDE_MEANS if _has_means(inquiry) else 1.0
     curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
+
+
+def _has_means(inquiry: Inquiry) -> bool:
+    """Whether the log has means of commands only."""
+    return any(recording.periods > 1 for recording in inquiry.recordings)
 
 
 def _significant(found: list[Leftover], p_value: float, least: Mapping[str, float], level: float) -> list[Leftover]:

@@ -23,16 +23,10 @@ WIDE = 0.3  # relative half width of an interval from which a number is called w
 
 def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     """Every number of a fit with its 95 % interval."""
-    log = fitter.follower.log
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
-    explained = max(fit.log_likelihood - nominal.log_likelihood, 0.0)
-    # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
-    wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * explained)
-    chance = wider * np.sqrt(np.diag(covariance(fit, log))) if len(cube) else np.zeros(0)
     values = space.to_values(cube)
-    doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
-    deviation = np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
-    as_good = alike(fitter, fit, explained)
+    deviation = deviations(fitter, fit, nominal)
+    as_good = alike(fitter, fit, _explained(fit, nominal))
     low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
     high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
     # A number without any influence may be anything.
@@ -51,6 +45,21 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
         for i, p in enumerate(space.free)
         for turns in [_whole_turns(p.name, float(values[i]))]
     )
+
+
+def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
+    """Standard deviations of the position in the cube, with all that is in doubt beside chance, shape (D,)."""
+    if not len(fit.hypothesis.cube):
+        return np.zeros(0)
+    # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
+    wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * _explained(fit, nominal))
+    chance = wider * np.sqrt(np.diag(covariance(fit, fitter.follower.log)))
+    doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
+    return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
+
+
+def _explained(fit: Fit, nominal: Fit) -> float:
+    return max(fit.log_likelihood - nominal.log_likelihood, 0.0)
 
 
 def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:

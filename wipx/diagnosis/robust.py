@@ -26,8 +26,8 @@ def covariance(fit: Fit, log: Log) -> np.ndarray:
     scores = _scores(fit, log)
     sandwich = plain @ (scores.T @ scores) @ plain
     # a number without influence may come out a little below zero
-    larger = np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0)
-    found = plain * np.sqrt(np.outer(larger, larger))
+    wider = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0))
+    found = plain * wider[:, None] * wider
     found[np.diag_indices_from(found)] = np.maximum(np.diag(found), 0.0)
     return found
 
