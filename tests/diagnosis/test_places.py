@@ -8,10 +8,10 @@ from wipx.diagnosis.places import ripples, sticky_spots
 from wipx.diagnosis.screening import basis_of
 
 
-@pytest.mark.parametrize("periods", [1.3, 5.0, 10.0])
+@pytest.mark.parametrize("periods", [1.3, 5.0, 12.0])
 def test_ripple_is_found_at_any_number_of_periods(periods: float, fresh_seed: int):
-    way = np.ptp(bench("pendulum", {}, fresh_seed).recordings[0]["theta"])
-    truth = {"A": 0.06, "n": 2.0 * np.pi * periods / way, "phase": 1.0}
+    way = np.ptp(np.concatenate([r["theta"] for r in bench("pendulum", {}, fresh_seed).recordings]))
+    truth = {"A": 0.02, "n": 2.0 * np.pi * periods / way, "phase": 1.0}
     case = bench("pendulum", {"actuator/ripple": truth}, fresh_seed)
     amplitude, number, _ = guesses(ripples, case)[0]
     assert number * way == pytest.approx(truth["n"] * way, abs=1.5)  # [rad] over the whole way
