@@ -175,9 +175,9 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
     if strongest is None:
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
     forces = [leftover for leftover in left if leftover.shape.kind != "resonance"]
-    if not forces and named is None and _has_means(inquiry):  # which feign what swings; its law does not confirm it
-        return Rest(fit, None, p_value, False, (), np.zeros(0))
     if not forces:
+        if named is None and inquiry.log.has_means:  # which feign what swings; its law does not confirm it
+            return Rest(fit, None, p_value, False, (), np.zeros(0))
         named = fit if named is None else _without_superfluous(inquiry, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     widest = max(forces, key=lambda leftover: leftover.gain)
@@ -195,14 +195,9 @@ def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, 
     """What a leftover of each kind must gain [nats]."""
     share = rough.SHARE if rough.is_rough(fit) else LEFTOVER_SHARE
     share *= fit.motion_likelihood - selection.nominal.motion_likelihood
-    factor = BESIDE_MEANS if _has_means(inquiry) else 1.0
+    factor = BESIDE_MEANS if inquiry.log.has_means else 1.0
     curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
-
-
-def _has_means(inquiry: Inquiry) -> bool:
-    """Whether the log has means of commands only."""
-    return any(recording.periods > 1 for recording in inquiry.recordings)
 
 
 def _significant(found: list[Leftover], p_value: float, least: Mapping[str, float], level: float) -> list[Leftover]:

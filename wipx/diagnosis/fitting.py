@@ -145,8 +145,7 @@ class Fitter:
     def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
         """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
         kinds = {name.partition("/")[2] for name in model.effects}
-        averaged = any(recording.periods > 1 for recording in self.follower.log.recordings)
-        matters = averaged and not kinds.isdisjoint(THRESHOLDS)
+        matters = self.follower.log.has_means and not kinds.isdisjoint(THRESHOLDS)
         if matters == (levels.spread > 0.0):
             return levels
         return replace(levels, spread=1.0 if matters else 0.0)

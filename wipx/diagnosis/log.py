@@ -83,6 +83,11 @@ class Log:
         """Time from each row to the next, shape (K, R) [s]; zero in the padding."""
         return np.where(self.rows[1:], np.diff(self.inputs.t, axis=0), 0.0)
 
+    @property
+    def has_means(self) -> bool:
+        """Whether rows have means of commands only, the log being slower than the loop."""
+        return any(recording.periods > 1 for recording in self.recordings)
+
     @cached_property
     def command_spread(self) -> np.ndarray:
         """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,).
@@ -106,7 +111,7 @@ class Log:
         command on the motion it would feign a delay. Empty (no inputs) where every command is in the log.
         """
         count = len(self.recordings)
-        if all(recording.periods == 1 for recording in self.recordings):
+        if not self.has_means:
             return np.zeros((count, 0, len(self.rows)))
         inputs = self.inputs.commands.shape[1]
         found = np.zeros((count, inputs, len(self.rows)))
