@@ -13,10 +13,10 @@ from wipx.sim.rows import W
 
 
 @law
-def delayed_command(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
+def delayed_command(S, n, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
     """The mean command over the step, after the transport delay (scalar: every lane has its own past)."""
     last = t_rows.shape[0] - 2
-    for w in range(W):
+    for w in range(n):
         h = S[R.STEP * W + w]
         if h <= 0.0:
             S[R.DRIVE * W + w], S[R.DRIVE1 * W + w] = S[R.COMMAND * W + w], S[R.COMMAND1 * W + w]
@@ -55,51 +55,51 @@ def ramped(t_rows, ramps, window, i, j, begin, end):
 
 
 @inlined
-def actuator_path(S, on, j):
+def actuator_path(S, n, on, j):
     """From the command of joint j to the force on it."""
     u = (R.DRIVE + j) * W
     v = (R.RATE + j) * W
     if on[R.ON_OFFSET]:
-        for w in range(W):
+        for w in range(n):
             S[u + w] += S[R.OFFSET * W + w]
     if on[R.ON_DEAD_ZONE]:
-        for w in range(W):
+        for w in range(n):
             S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w], S[(R.SPREAD + j) * W + w])
-    for w in range(W):
+    for w in range(n):
         S[u + w] *= S[R.GAIN * W + w]
     if on[R.ON_SATURATION]:
-        for w in range(W):
+        for w in range(n):
             S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[(R.SPREAD + j) * W + w])
     if on[R.ON_SPEED_LIMIT]:
-        for w in range(W):
+        for w in range(n):
             S[u + w] = speed_limit.limited(
                 S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w], S[(R.SPREAD + j) * W + w]
             )
     if on[R.ON_BACK_EMF]:
-        for w in range(W):
+        for w in range(n):
             S[u + w] -= S[R.BACK_EMF * W + w] * S[v + w]
     if on[R.ON_LAG]:
         a = (R.LAGGED + j) * W
-        for w in range(W):
+        for w in range(n):
             rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
             S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w] if S[R.STEP * W + w] > 0.0 else S[a + w]
             S[u + w] += rest * S[R.LAG_MEAN * W + w]
     if on[R.ON_REPORT]:
-        for w in range(W):
+        for w in range(n):
             S[(R.DELIVERED + j) * W + w] += S[R.STEP * W + w] * S[u + w]
     if on[R.ON_RIPPLE]:
-        for w in range(W):
+        for w in range(n):
             angle = S[R.RIPPLE_PERIODS * W + w] * S[(R.MID + j) * W + w] + S[R.RIPPLE_PHASE * W + w]
             _, cosine = sin_cos(angle)
             S[u + w] += S[R.RIPPLE * W + w] * cosine
     if on[R.ON_BACKLASH]:
-        backlash(S, j)
+        backlash(S, n, j)
 
 
 @inlined
-def backlash(S, j):
+def backlash(S, n, j):
     """Pass on the force of joint j where its drive is in contact."""
-    for w in range(W):
+    for w in range(n):
         force = S[(R.DRIVE + j) * W + w]
         gap = S[R.GAP * W + w]
         begun = S[R.STARTED * W + w] > 0.0

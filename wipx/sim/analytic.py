@@ -19,10 +19,10 @@ from wipx.sim.coefficients import coefficients
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
 from wipx.sim.layout import HELD, NO_ROWS, OPEN, Layout
-from wipx.sim.rows import W
+from wipx.sim.rows import TOGETHER
 from wipx.sim.simulator import Rollouts, StateFeedback
 
-LEAST_WORK_PER_THREAD = 150_000  # lane steps, about 1.5 ms: less is not worth a thread
+LEAST_WORK_PER_THREAD = 75_000  # lane steps, about 1 ms: less is not worth a thread
 NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
 
 
@@ -232,13 +232,13 @@ class _Run:
         return measured, gains, observer.group.astype(np.int64)
 
     def _shares(self, first_row: int, last_row: int) -> list[int]:
-        """Lane bounds of the threads, in whole blocks."""
+        """Lane bounds of the threads, in whole vectors."""
         threads = self.simulator.threads or os.cpu_count() or 1
         steps = self.layout.lanes * int(self.substeps[first_row:last_row].max(axis=1, initial=0).sum())
-        blocks = -(-self.layout.lanes // W)
-        shares = max(1, min(threads, blocks, steps // LEAST_WORK_PER_THREAD))
         lanes = self.layout.lanes
-        return [min(lanes, W * (blocks * i // shares)) for i in range(shares)] + [lanes]
+        vectors = -(-lanes // TOGETHER)
+        shares = max(1, min(threads, vectors, steps // LEAST_WORK_PER_THREAD))
+        return [TOGETHER * (vectors * i // shares) for i in range(shares)] + [lanes]
 
     def rollouts(self, commands: np.ndarray) -> Rollouts:
         reported = self.coefficients.present[R.ON_REPORT]

@@ -6,9 +6,9 @@ from wipx.sim.rows import W
 
 
 @law
-def load_body(S):
+def load_body(S, n):
     """The body as it is before any payload event."""
-    for w in range(W):
+    for w in range(n):
         S[R.M11 * W + w] = S[R.MASS * W + w]
         S[R.M22 * W + w] = S[R.INERTIA * W + w]
         S[R.COUPLING_NOW * W + w] = S[R.COUPLING * W + w]
@@ -23,10 +23,10 @@ def share_after(S, w):
 
 
 @law
-def payload_event(S):
+def payload_event(S, n):
     """Masses after t0 in place of those before, weighed by the share of the step after t0."""
-    load_body(S)
-    for w in range(W):
+    load_body(S, n)
+    for w in range(n):
         after = share_after(S, w)
         S[R.M11 * W + w] += after * S[R.EVENT_MASS * W + w]
         S[R.M22 * W + w] += after * S[R.EVENT_INERTIA * W + w]
@@ -36,16 +36,16 @@ def payload_event(S):
 
 
 @law
-def spring(S):
+def spring(S, n):
     """Cable, hose or bumper on the carriage."""
-    for w in range(W):
+    for w in range(n):
         S[R.FORCE * W + w] -= S[R.SPRING * W + w] * (S[R.MID * W + w] - S[R.SPRING_REST * W + w])
 
 
 @law
-def wip_body(S, on):
+def wip_body(S, n, on):
     """Mass matrix and forces of the rigid body; contract section 2."""
-    for w in range(W):
+    for w in range(n):
         s, c = sin_cos(S[R.MID1 * W + w] - S[R.BALANCE * W + w])
         rate = S[R.RATE1 * W + w]
         coupling = S[R.COUPLING_NOW * W + w]
@@ -54,7 +54,7 @@ def wip_body(S, on):
         S[R.FORCE1 * W + w] += S[R.GRAVITY_NOW * W + w] * s
     if on[R.ON_TILT]:
         # The coupling sees the angle to the rail, gravity the angle to the vertical.
-        for w in range(W):
+        for w in range(n):
             upright = S[R.MID1 * W + w] - S[R.BALANCE * W + w]
             s0, _ = sin_cos(upright)
             s, c = sin_cos(upright - S[R.TILT * W + w])
@@ -65,9 +65,9 @@ def wip_body(S, on):
 
 
 @law
-def double_body(S):
+def double_body(S, n):
     """Mass matrix and forces of the double pendulum, theta1 = 0 hanging."""
-    for w in range(W):
+    for w in range(n):
         s2, c2 = sin_cos(S[R.MID1 * W + w])
         s1, _ = sin_cos(S[R.MID * W + w])
         s12, _ = sin_cos(S[R.MID * W + w] + S[R.MID1 * W + w])

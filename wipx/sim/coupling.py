@@ -19,14 +19,15 @@ LOST = 1e6  # [m, rad, m/s, rad/s]; beyond it a rollout has fallen over, and the
 
 
 @cached
-def show(S, on, past, t_rows, lanes, k, out, lane0, count):
+def show(S, n, on, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k."""
-    record(S, on, past, t_rows, lanes, k, out, lane0, count)
+    record(S, n, on, past, t_rows, lanes, k, out, lane0, count)
 
 
 @cached
 def begin(
     S,
+    n,
     on,
     t_rows,
     u_rows,
@@ -47,24 +48,24 @@ def begin(
 ):
     """Load commands and steps of row k, which was shown; the smallest and the largest number of steps."""
     if closed:
-        feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
+        feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
     else:
-        replay(S, on, u_rows, ramps, lanes, actuated, k)
-    least, most = begin_row(S, on, t_rows, row_steps, substeps, lanes, counts, k)
-    if count < W:
-        for w in range(count, W):
+        replay(S, n, on, u_rows, ramps, lanes, actuated, k)
+    least, most = begin_row(S, n, on, t_rows, row_steps, substeps, lanes, counts, k)
+    if count < n:
+        for w in range(count, n):
             counts[w] = 0
         least = 0
     return least, most
 
 
 @cached
-def before(S, X, on, t_rows, u_rows, ramps, lanes, pointers, actuated, counts, least, s):
+def before(S, n, X, on, t_rows, u_rows, ramps, lanes, pointers, actuated, counts, least, s):
     """Step s of a row up to the forces that act in mid-step, and where the engine is to stand (rows of `exchange`)."""
     if s == 0 or s >= least:
-        set_step(S, on, counts, s)
-    step(S, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
-    for w in range(W):
+        set_step(S, n, on, counts, s)
+    step(S, n, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
+    for w in range(n):
         place, place1 = S[R.MID * W + w], S[R.MID1 * W + w]
         speed, speed1 = S[R.RATE * W + w], S[R.RATE1 * W + w]
         found = abs(place) < LOST and abs(place1) < LOST and abs(speed) < LOST and abs(speed1) < LOST
@@ -72,21 +73,21 @@ def before(S, X, on, t_rows, u_rows, ramps, lanes, pointers, actuated, counts, l
         X[E.PLACE, w], X[E.PLACE1, w] = place, place1
         X[E.SPEED, w], X[E.SPEED1, w] = speed, speed1
     if on[R.ON_EVENT]:
-        for w in range(W):
+        for w in range(n):
             X[E.LOADED, w] = share_after(S, w)
 
 
 @cached
-def between(S, X, on):
+def between(S, n, X, on):
     """The rates at the end of the step from the engine's mass matrix and bias, and the force that leads there."""
-    for w in range(W):
+    for w in range(n):
         S[R.M11 * W + w] = X[E.MASS11, w] + X[E.ROTOR, w]
         S[R.M12 * W + w] = X[E.MASS12, w]
         S[R.M22 * W + w] = X[E.MASS22, w] + X[E.ROTOR1, w]
         S[R.FORCE * W + w] -= X[E.BIAS, w]
         S[R.FORCE1 * W + w] -= X[E.BIAS1, w]
-    respond(S, on)
-    for w in range(W):
+    respond(S, n, on)
+    for w in range(n):
         per_step = S[R.PER_STEP * W + w]
         a0 = (S[R.V * W + w] - X[E.SPEED, w]) * per_step
         a1 = (S[R.V1 * W + w] - X[E.SPEED1, w]) * per_step
@@ -102,9 +103,9 @@ def lost(S, X, w):
 
 
 @cached
-def after(S, X):
+def after(S, n, X):
     """Take over where the engine stands after its step."""
-    for w in range(W):
+    for w in range(n):
         h = X[E.DURATION, w]
         if h > 0.0:
             S[R.V * W + w], S[R.V1 * W + w] = X[E.SPEED, w], X[E.SPEED1, w]

@@ -18,24 +18,24 @@ from wipx.sim.rows import W
 
 
 @inlined
-def levels(S, on, j):
+def levels(S, n, on, j):
     """Dry friction of joint j: the impulse may lie anywhere up to these levels."""
     v = (R.RATE + j) * W
     if on[R.ON_STRIBECK + j]:
-        for w in range(W):
+        for w in range(n):
             static, coulomb = S[(R.STATIC + j) * W + w], S[(R.COULOMB + j) * W + w]
             more = stribeck.bump(S[v + w], static, coulomb, S[(R.STRIBECK_SPEED + j) * W + w])
             S[(R.PLUS + j) * W + w] += more
             S[(R.MINUS + j) * W + w] += more
     if on[R.ON_LOAD + j]:
-        for w in range(W):
+        for w in range(n):
             motor = S[(R.DRIVE + j) * W + w]
             load = S[(R.FORCE + j) * W + w] - motor
             more = load_friction.level(motor, load, S[(R.LOAD_MOTOR + j) * W + w], S[(R.LOAD_EXTERNAL + j) * W + w])
             S[(R.PLUS + j) * W + w] += more
             S[(R.MINUS + j) * W + w] += more
     if on[R.ON_SPOT] and j == 0:
-        for w in range(W):
+        for w in range(n):
             now = S[R.Q * W + w]
             there = now + S[R.STEP * W + w] * S[v + w]
             more = S[R.SPOT * W + w] * sticky_spot.share(now, there, S[R.SPOT_LOW * W + w], S[R.SPOT_HIGH * W + w])
@@ -44,18 +44,18 @@ def levels(S, on, j):
 
 
 @inlined
-def smooth_friction(S, on, j):
+def smooth_friction(S, n, on, j):
     """Friction of joint j that is a force: drag, bristle, the paper's lagged law."""
     v = (R.RATE + j) * W
     if on[R.ON_DRAG + j]:
-        for w in range(W):
+        for w in range(n):
             S[(R.FORCE + j) * W + w] += quadratic_drag.force(S[v + w], S[(R.DRAG + j) * W + w])
     if on[R.ON_BRISTLE + j]:
-        bend(S, on, j)
+        bend(S, n, on, j)
     if on[R.ON_REMAINDER + j]:
-        remainder(S, j)
+        remainder(S, n, j)
     if on[R.ON_SWING + j]:
-        for w in range(W):
+        for w in range(n):
             h = S[R.STEP * W + w]
             stiffness, damping = S[(R.SWING_STIFFNESS + j) * W + w], S[(R.SWING_DAMPING + j) * W + w]
             place, rate = S[(R.SWING_PLACE + j) * W + w], S[(R.SWING_RATE + j) * W + w]
@@ -64,7 +64,7 @@ def smooth_friction(S, on, j):
             S[(R.SWING_RATE + j) * W + w], S[(R.SWING_PLACE + j) * W + w] = rate, place
             S[(R.FORCE + j) * W + w] += S[(R.SWING + j) * W + w] * (stiffness * place + damping * rate)
     if on[R.ON_PAPER + j]:
-        for w in range(W):
+        for w in range(n):
             steady = lagged_stribeck.resistance(
                 S[v + w],
                 S[(R.PAPER_STATIC + j) * W + w],
@@ -81,20 +81,20 @@ def smooth_friction(S, on, j):
 
 
 @inlined
-def bend(S, on, j):
+def bend(S, n, on, j):
     """The force of a bristle on joint j, linear in the rate of the step, and how it will bend."""
     v = (R.RATE + j) * W
     if on[R.ON_HYSTERESIS + j]:
-        for w in range(W):
+        for w in range(n):
             exponent, gamma = S[(R.EXPONENT + j) * W + w], S[(R.GAMMA + j) * W + w]
             per_way = S[(R.BRISTLE + j) * W + w] / maximum(S[(R.SLIDING + j) * W + w], 1e-12)
             share, way = per_way * S[(R.Z + j) * W + w], 0.5 * S[R.STEP * W + w] * S[v + w]
             middle = share + per_way * (way - abs(way) * share * yielding(share, way, exponent, gamma))
             S[(R.YIELDING + j) * W + w] = yielding(middle, way, exponent, gamma)
     else:
-        for w in range(W):
+        for w in range(n):
             S[(R.YIELDING + j) * W + w] = 1.0
-    for w in range(W):
+    for w in range(n):
         sliding, speed = S[(R.SLIDING + j) * W + w], abs(S[v + w])
         level = sliding + stribeck.bump(speed, S[(R.PEAK + j) * W + w], sliding, S[(R.PEAK_SPEED + j) * W + w])
         stiffness, damping = S[(R.BRISTLE + j) * W + w], S[(R.BRISTLE_DAMPING + j) * W + w]
@@ -110,9 +110,9 @@ def bend(S, on, j):
 
 
 @inlined
-def remainder(S, j):
+def remainder(S, n, j):
     """The piecewise linear force of joint j over one signal, or level of its dry friction."""
-    for w in range(W):
+    for w in range(n):
         code = int(S[(R.REMAINDER_SIGNAL + j) * W + w])
         if code < 2:
             signal = S[(R.MID + code) * W + w]
@@ -137,17 +137,17 @@ def remainder(S, j):
 
 
 @law
-def stick_or_slide(S, on):
+def stick_or_slide(S, n, on):
     """Take from the rates at the end of the step what dry friction takes: all of it, or its level."""
-    for w in range(W):
+    for w in range(n):
         S[R.YIELD * W + w] = S[R.W11 * W + w]
         S[R.YIELD1 * W + w] = S[R.W22 * W + w]
     if on[R.ON_SMOOTHING]:  # a joint that yields while it "sticks" is a compliance in series
         for j in range(2):
-            for w in range(W):
+            for w in range(n):
                 reach = S[R.STEP * W + w] * (S[(R.PLUS + j) * W + w] + S[(R.MINUS + j) * W + w])
                 S[(R.YIELD + j) * W + w] += 2.0 * S[(R.SMOOTHING + j) * W + w] / maximum(reach, 1e-15)
-    for w in range(W):
+    for w in range(n):
         h = S[R.STEP * W + w]
         w11, w12, w22 = S[R.W11 * W + w], S[R.W12 * W + w], S[R.W22 * W + w]
         b0, b1 = S[R.NEXT * W + w], S[R.NEXT1 * W + w]
@@ -162,9 +162,9 @@ def stick_or_slide(S, on):
 
 
 @law
-def move(S, on):
+def move(S, n, on):
     """Solve for the rates at the end of the step, with sticking, and drift the second half."""
-    for w in range(W):
+    for w in range(n):
         h = S[R.STEP * W + w]
         v0, v1 = S[R.V * W + w], S[R.V1 * W + w]
         d0, d1 = S[R.DAMPING * W + w], S[R.DAMPING1 * W + w]
@@ -180,9 +180,9 @@ def move(S, on):
         S[R.NEXT * W + w] = v0 + (a22 * r0 - a12 * r1) * inverse
         S[R.NEXT1 * W + w] = v1 + (a11 * r1 - a12 * r0) * inverse
     if on[R.ON_FRICTION]:
-        stick_or_slide(S, on)
+        stick_or_slide(S, n, on)
     for j in range(2):
-        for w in range(W):
+        for w in range(n):
             before, after = S[(R.V + j) * W + w], S[(R.NEXT + j) * W + w]
             S[(R.Q + j) * W + w] = S[(R.MID + j) * W + w] + 0.5 * S[R.STEP * W + w] * after
             S[(R.V + j) * W + w] = after
@@ -191,12 +191,12 @@ def move(S, on):
             S[(R.ACCELERATION + j) * W + w] = acceleration if S[R.STEP * W + w] > 0.0 else last
             S[(R.RATE + j) * W + w] = 0.5 * (before + after)
         if on[R.ON_BACKLASH]:
-            for w in range(W):
+            for w in range(n):
                 if S[R.STEP * W + w] > 0.0:
                     lightness = S[(R.W22 if j else R.W11) * W + w]
                     S[(R.LIGHTNESS + j) * W + w] = lightness
                     S[(R.MADE + j) * W + w] = lightness * S[(R.DRIVE + j) * W + w]
         if on[R.ON_BRISTLE + j]:
-            for w in range(W):
+            for w in range(n):
                 z, mean = S[(R.Z + j) * W + w], S[(R.RATE + j) * W + w]
                 S[(R.Z + j) * W + w] = S[(R.BRISTLE_KEPT + j) * W + w] * z + S[(R.BRISTLE_GAIN + j) * W + w] * mean

@@ -4,7 +4,8 @@ One rollout is one column ("lane"). A pair of rows `X, X1` belongs to joints 0 a
 the commands that act on them).
 """
 
-W = 64  # lanes of a block; from 64 on the compiler vectorises every loop instead of unrolling it
+W = 64  # lanes that a block has room for
+TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up to a multiple of it
 
 # Coefficients of a model, constant during a rollout (filled by `coefficients`).
 (

@@ -24,10 +24,10 @@ def interpolate(past, t_rows, window, k, j, lane, moment):
 
 
 @law
-def record(S, on, past, t_rows, lanes, k, out, lane0, count):
+def record(S, n, on, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
     for j in range(2):
-        for w in range(W):
+        for w in range(n):
             true = S[(R.Q + j) * W + w]
             S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * true + S[(R.BIAS + j) * W + w]
     if on[R.ON_SENSOR_DELAY]:
@@ -44,34 +44,34 @@ def record(S, on, past, t_rows, lanes, k, out, lane0, count):
 
 
 @law
-def feedback(S, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
+def feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
     """State feedback u = -K (y - y_ref) on what the sensors show, at the rows of the log."""
     smoothing, limit = settings[0], settings[1]
     for i in range(4):
         S[(R.NOISE + i) * W : (R.NOISE + i) * W + count] = noise[k, i, lane0 : lane0 + count]
         reference = references[k, i]
-        for w in range(W):
+        for w in range(n):
             S[(R.REFERENCE + i) * W + w] = reference[lanes[0, w]]
     if smoothing >= 0.0:  # rates from differences of the coordinates, through a low-pass
-        for w in range(W):
+        for w in range(n):
             window = lanes[0, w]
             S[R.TIME * W + w] = t_rows[k, window] - t_rows[max(k, 1) - 1, window]
     for j in range(2):
         if smoothing < 0.0:
-            for w in range(W):
+            for w in range(n):
                 S[(R.MEASURED_RATE + j) * W + w] = S[(R.V + j) * W + w] + S[(R.NOISE_RATE + j) * W + w]
         else:
-            for w in range(W):
+            for w in range(n):
                 dt = S[R.TIME * W + w]
                 moved = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w] - S[(R.MEASURED + j) * W + w]
                 rate = S[(R.MEASURED_RATE + j) * W + w]
                 filtered = rate + (moved - rate * dt) / (dt + smoothing)
                 S[(R.MEASURED_RATE + j) * W + w] = filtered if k > 0 else 0.0
-        for w in range(W):
+        for w in range(n):
             S[(R.MEASURED + j) * W + w] = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w]
     for c in range(2):
         k0, k1, k2, k3 = gains[c, 0], gains[c, 1], gains[c, 2], gains[c, 3]
-        for w in range(W):
+        for w in range(n):
             u = -k0 * (S[R.MEASURED * W + w] - S[R.REFERENCE * W + w])
             u -= k1 * (S[R.MEASURED1 * W + w] - S[R.REFERENCE1 * W + w])
             u -= k2 * (S[R.MEASURED_RATE * W + w] - S[R.REFERENCE_RATE * W + w])

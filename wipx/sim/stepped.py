@@ -18,6 +18,7 @@ from wipx.sim.coefficients import coefficients
 from wipx.sim.coupling import after, before, begin, between, show
 from wipx.sim.exchange import Exchange
 from wipx.sim.inputs import Inputs
+from wipx.sim.kernel import filled
 from wipx.sim.layout import HELD, OPEN, ClosedLoop, Layout
 from wipx.sim.mechanism import check_possible
 from wipx.sim.rows import W
@@ -218,13 +219,15 @@ class _Run:
         S, X = block.rows.reshape(-1), block.exchange.values
         lanes, pointers, counts = block.lanes, block.pointers, block.counts
         actuated, first, count = self.coefficients.actuated, block.first, block.count
+        n = filled(count)
         pattern, driven = self.layout.pattern, self.layout.driven
         for k in range(self.layout.rows):
-            show(S, on, self.past, t, lanes, k, out, first, count)
+            show(S, n, on, self.past, t, lanes, k, out, first, count)
             if controller is not None:
                 commands[k, driven, 0] = controller(float(t[k, 0]), out[k, pattern, 0])
             least, most = begin(
                 S,
+                n,
                 on,
                 t,
                 commands,
@@ -244,9 +247,9 @@ class _Run:
                 loop.settings,
             )
             for s in range(most):
-                before(S, X, on, t, commands, ramps, lanes, pointers, actuated, counts, least, s)
+                before(S, n, X, on, t, commands, ramps, lanes, pointers, actuated, counts, least, s)
                 world.weigh()
-                between(S, X, on)
+                between(S, n, X, on)
                 world.advance()
-                after(S, X)
-        show(S, on, self.past, t, lanes, self.layout.rows, out, first, count)
+                after(S, n, X)
+        show(S, n, on, self.past, t, lanes, self.layout.rows, out, first, count)
