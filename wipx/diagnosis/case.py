@@ -10,6 +10,7 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.answer import answered, proposed
+from wipx.diagnosis.caveats import caveats
 from wipx.diagnosis.decision import decided
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.inquiry import Inquiry
@@ -114,4 +115,5 @@ def diagnose(
         watcher("suspects", 0.95)
         answer = replace(answer, suspects=asked(inquiry, selection, rest, answer, suspected))
     watcher("done", 1.0)
-    return replace(answer, title=title, source=source, seconds=time.perf_counter() - begun)
+    seconds = time.perf_counter() - begun
+    return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)

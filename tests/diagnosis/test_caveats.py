@@ -1,0 +1,40 @@
+"""What recordings lack is said before a reader relies on them."""
+
+import numpy as np
+
+from wipx.core.recording import Recording
+from wipx.diagnosis.caveats import caveats
+
+
+def recording(name: str, t: np.ndarray) -> Recording:
+    return Recording(name, {"t": t, "u": np.zeros(len(t))})
+
+
+def even(name: str) -> Recording:
+    return recording(name, np.arange(400) / 200.0)
+
+
+def test_nothing_is_said_of_several_even_logs():
+    assert caveats((even("r1.csv"), even("r2.csv"))) == ()
+
+
+def test_missing_rows_are_counted(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    kept = np.ones(400, dtype=bool)
+    lost = rng.choice(np.arange(1, 399), size=30, replace=False)
+    kept[lost] = False
+    (said,) = caveats((even("r1.csv"), recording("r2.csv", even("r2.csv").t[kept])))
+    assert "in 1 of 2 recordings" in said
+    assert "r2.csv (30 of 400)" in said
+
+
+def test_uneven_steps_are_told(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    steps = (1.0 + np.clip(0.1 * rng.standard_normal(2000), -0.3, 0.3)) / 200.0
+    (said,) = caveats((recording("r1.csv", np.cumsum(steps)), even("r2.csv")))
+    assert "most in r1.csv (by 10 %)" in said
+
+
+def test_a_single_recording_is_no_second_opinion():
+    (said,) = caveats((even("swing.csv"),))
+    assert "one recording only, swing.csv" in said

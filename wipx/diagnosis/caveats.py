@@ -1,0 +1,46 @@
+"""What in the recordings themselves a reader must know before he relies on a diagnosis of them."""
+
+import numpy as np
+
+from wipx.core.recording import Recording
+
+GAP = 1.5  # usual time steps, beyond which rows are missing
+UNEVEN = 0.05  # of the usual time step, by which others vary
+
+
+def caveats(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
+    """One sentence for each: a single recording, missing rows, uneven time steps."""
+    said = []
+    if len(recordings) == 1:
+        said.append(
+            f"There is one recording only, {recordings[0].name}: what differs from run to run cannot show, "
+            "and what is held out is a part of the same run."
+        )
+    missing = {one.name: _missing(one) for one in recordings if _missing(one)}
+    if missing:
+        worst = max(missing, key=lambda name: missing[name])
+        whole = next(len(one) for one in recordings if one.name == worst) + missing[worst]
+        said.append(
+            f"Rows are missing in {len(missing)} of {len(recordings)} recordings, most in {worst} "
+            f"({missing[worst]} of {whole}); the command before a gap counts as held through it."
+        )
+    uneven = {one.name: _unevenness(one) for one in recordings if _unevenness(one) > UNEVEN}
+    if uneven:
+        worst = max(uneven, key=lambda name: uneven[name])
+        said.append(
+            f"Time steps vary in {len(uneven)} of {len(recordings)} recordings, most in {worst} "
+            f"(by {100.0 * uneven[worst]:.0f} %); they are taken as logged."
+        )
+    return tuple(said)
+
+
+def _missing(recording: Recording) -> int:
+    """Rows that the gaps of a recording have room for."""
+    steps = np.diff(recording.t) * recording.rate
+    return int(np.sum(np.rint(steps[steps > GAP]) - 1.0))
+
+
+def _unevenness(recording: Recording) -> float:
+    """Standard deviation of the time steps without gaps, relative to the usual one."""
+    steps = np.diff(recording.t) * recording.rate
+    return float(np.std(steps[steps <= GAP]))
