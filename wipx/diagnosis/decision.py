@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis import rough
@@ -241,7 +241,7 @@ def _other_law(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -
                 best, most = found, gain
     if best is None:
         return None
-    p_value = float(stats.chi2.sf(2.0 * most, len(best.hypothesis.cube) - len(fit.hypothesis.cube)))
+    p_value = float(chdtrc(len(best.hypothesis.cube) - len(fit.hypothesis.cube), 2.0 * most))
     best = _without_superfluous(inquiry, selection, best)
     return Rest(best, None, p_value, True, (best.effects[-1],), np.zeros(0))
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from wipx.core.diagnosis import Diagnosis, Suspect, SuspectedSize
 from wipx.core.effect import Effect
@@ -131,7 +131,7 @@ class _Asked:
             size=None,
         )
         if values:
-            limit = 0.5 * chi2.ppf(CONFIDENCE, len(values)) * _overstated(free, numbers, self.name)
+            limit = 0.5 * chdtri(len(values), 1.0 - CONFIDENCE) * _overstated(free, numbers, self.name)
             suspect = replace(suspect, size=self.of_size(suspect, values, free, best, float(limit)))
         unexplained = self.answer.unexplained.significant
         return replace(suspect, sentence=suspect_sentence(suspect, unexplained=unexplained))

@@ -1,7 +1,7 @@
 """95 % intervals of identified numbers."""
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from wipx.identify.closed_loop import ClosedLoopProblem
 from wipx.identify.problem import SLOPE_STEP, WindowProblem
@@ -44,6 +44,6 @@ def intervals(problem: WindowProblem | ClosedLoopProblem, cube: np.ndarray) -> n
     matrix, clusters = covariance(problem, cube)
     deviation = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     deviation = np.where(deviation < UNSEEN, np.inf, deviation)
-    reach = stats.t.ppf(0.975, max(clusters - len(cube), 1)) * deviation
+    reach = stdtrit(max(clusters - len(cube), 1), 0.975) * deviation
     low, high = np.maximum(cube - reach, 0.0), np.minimum(cube + reach, 1.0)
     return np.stack([problem.space.to_values(low), problem.space.to_values(high)], axis=1)

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
 
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.model import Model, ModelBatch
@@ -58,6 +57,8 @@ class ParameterSpace:
             rng: Draws them.
             reach: Share of the way from the neutral value to the end of an interval, up to which is drawn.
         """
+        from scipy.stats import qmc  # slow to import, and few need it
+
         uniform = qmc.Sobol(len(self.free), rng=rng).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
         neutral = self.neutral
         end = (rng.random(uniform.shape) < 1.0 - neutral).astype(float)
