@@ -1,12 +1,17 @@
-"""A drive that crosses a gap: its likelihood is rough, and the search sees beyond the kinks."""
+"""Likelihoods that are rough, of a drive that crosses a gap or is late: the search sees beyond the kinks."""
 
 import numpy as np
-from diagnosis.recorded import bench
+import pytest
+from diagnosis.recorded import SIMULATOR, Bench, bench
+from identify.emulated_robot import nominal_model
 
+from wipx.core.model import ModelBatch
+from wipx.core.recording import Recording
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.play import plays
 from wipx.diagnosis.rough import alike, explored
 from wipx.diagnosis.screening import basis_of
+from wipx.sim.inputs import Inputs
 
 PLAY = "actuator/backlash"
 TRUE = {"gap": 6e-3, "drive_inertia": 0.2, "drive_damping": 0.0, "returned": 1.0, "contact_time": 0.0}
@@ -56,3 +61,23 @@ def test_a_fit_without_a_gap_is_left_as_it_is():
     fit = case.fit("translation/coulomb")
     assert explored(case.fitter, fit) is fit
     np.testing.assert_array_equal(alike(case.fitter, fit, 100.0), fit.hypothesis.cube[None])
+
+
+def test_a_delay_is_found_under_commands_that_change_with_every_row(fresh_seed: int):
+    """White commands tell a delay sharply: a millisecond beside it, the likelihood has other peaks."""
+    rng = np.random.default_rng(fresh_seed)
+    nominal = nominal_model("pendulum")
+    tau = float(rng.uniform(0.008, 0.03))
+    inputs = Inputs.regular(4.0, 490.0, 1, 3)
+    commands = 0.5 * rng.standard_normal((len(inputs.t) - 1, 1, 3))
+    driven = Inputs(inputs.t, commands, inputs.first, inputs.last)
+    late = ModelBatch(nominal.with_effects({"actuator/delay": {"tau": tau}}))
+    rest = np.stack([np.full((1, 3), np.pi), np.zeros((1, 3))])
+    theta = SIMULATOR.replay(late, driven, rest).coordinates[:-1, 0, 0]
+    theta += 3e-4 * rng.standard_normal(theta.shape)
+    recordings = tuple(
+        Recording(f"r{r}.csv", {"t": inputs.t[:-1, r], "theta": theta[:, r], "u": commands[:, 0, r]}) for r in range(3)
+    )
+    (found,) = Bench(nominal, recordings, {}).diagnosed().effects
+    assert "actuator/delay" in (found.name, *found.equivalent)  # without a controller a late sensor looks alike
+    assert found.parameters[0].value == pytest.approx(tau, rel=0.02)

@@ -216,6 +216,10 @@ class Fitter:
 
     def likeliest(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels, count: int) -> list[Hypothesis]:
         """The likeliest few of hypotheses of the same effects, as they are."""
+        return [hypotheses[i] for i in np.argsort(-self.likelihoods_of(hypotheses, levels))[:count]]
+
+    def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
+        """Log-likelihoods of hypotheses of the same effects, as they are."""
         cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
         gains = [self.follower.gains(levels, hypothesis.model) for hypothesis in hypotheses]
         alike = np.array([next(i for i, other in enumerate(gains) if other is own) for own in gains])
@@ -227,8 +231,7 @@ class Fitter:
         priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
         log = self.follower.log
         likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
-        likelihoods += np.array(scales)[group]
-        return [hypotheses[i] for i in np.argsort(-likelihoods)[:count]]
+        return likelihoods + np.array(scales)[group]
 
     def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
         gains = self.follower.gains(levels, hypothesis.model)

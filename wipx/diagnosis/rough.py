@@ -2,7 +2,8 @@
 
 A drive that meets its flank a step earlier or later makes small kinks in the likelihood, between which slopes over
 small steps lead nowhere. Trials at random distances, ever smaller, see what the kinks hide (an evolution strategy with
-a given schedule: Beyer, Schwefel 2002, Natural Computing 1).
+a given schedule: Beyer, Schwefel 2002, Natural Computing 1). Noisy commands that change with every row make the
+likelihood of a delay ripple too, with peaks closer than the rows; fits start from the highest ones.
 """
 
 from collections.abc import Sequence
@@ -10,12 +11,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.observer import NoiseLevels
 
 ROUGH = ("backlash",)
 DELAY, LATE = "actuator/delay", "actuator/backlash.contact_time"
 RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
 ALONG = 2.0  # times that, along the ridge
+LONGEST = 0.04  # [s] of a delay that is guessed closely; longer ones must show from afar
+PER_ROW = 8  # guesses over one row
+TOGETHER = 24  # guesses that are simulated at once; bounds the memory
+PEAKS = 4  # from which a fit starts
 LEAST = 0.02  # of the search interval, that a number counts at least
 TRIALS = 40  # at each width
 FACTORS = np.geomspace(1.0 / 8.0, 8.0, 10)  # along the ridge, that are looked at for as good a fit
@@ -41,6 +48,22 @@ def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
 def hides(fit: Fit, effect: str) -> bool:
     """Whether slopes do not show what an effect would explain: late flanks have the place of a delay."""
     return effect == DELAY and LATE in fit.hypothesis.values
+
+
+def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
+    """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
+    intervals = fitter.follower.log.intervals
+    step = float(np.median(intervals[intervals > 0.0])) / PER_ROW
+    guesses = np.arange(step, LONGEST, step)
+    values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)
+    values[:, begin.parameters_of(DELAY)[0]] = guesses
+    tried = [begin.at(cube) for cube in begin.space.to_cube(values)]
+    parts = [tried[i : i + TOGETHER] for i in range(0, len(tried), TOGETHER)]
+    found = np.concatenate([fitter.likelihoods_of(part, levels) for part in parts])
+    padded = np.concatenate([[-np.inf], found, [-np.inf]])
+    peak = (found > padded[:-2]) & (found >= padded[2:])
+    highest = sorted(np.flatnonzero(peak), key=lambda i: -found[i])[:PEAKS]
+    return [tried[i] for i in highest]
 
 
 def is_rough(fit: Fit) -> bool:
