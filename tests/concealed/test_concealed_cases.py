@@ -92,7 +92,7 @@ def test_where_nothing_is_missing_the_robot_is_the_nominal_one():
 
 def test_effects_that_no_recording_tells_apart_are_not_hidden_together(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
-    drawn = [set(choose(rng, "triple").names) for _ in range(400)]
+    drawn = [set(choose(rng, "triple").names) for _ in range(4000)]
     assert any({"environment/spring", "pitch/viscous"} <= names for names in drawn)
     for alike in (("environment/spring", "environment/rail_tilt"), ("geometry/com_offset", "sensor_theta/bias")):
         assert not any(names >= set(alike) for names in drawn)
