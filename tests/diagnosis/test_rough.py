@@ -9,7 +9,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.play import plays
-from wipx.diagnosis.rough import alike, explored
+from wipx.diagnosis.rough import alike, delays, explored
 from wipx.diagnosis.screening import basis_of
 from wipx.sim.inputs import Inputs
 
@@ -81,3 +81,12 @@ def test_a_delay_is_found_under_commands_that_change_with_every_row(fresh_seed: 
     (found,) = Bench(nominal, recordings, {}).diagnosed().effects
     assert "actuator/delay" in (found.name, *found.equivalent)  # without a controller a late sensor looks alike
     assert found.parameters[0].value == pytest.approx(tau, rel=0.02)
+
+
+def test_a_slow_log_has_guesses_of_the_delay_too():
+    nominal = nominal_model("pendulum")
+    t = np.arange(20) * 0.5
+    slow = Recording("r1.csv", {"t": t, "theta": np.pi + 0.1 * np.sin(t), "u": 0.1 * np.cos(t)})
+    case = Bench(nominal, (slow, slow), {})
+    begin = Hypothesis.of(case.setting, ("actuator/delay",), {})
+    assert delays(case.fitter, begin, case.quiet)

@@ -20,6 +20,7 @@ RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light d
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
 ALONG = 2.0  # times that, along the ridge
 LONGEST = 0.04  # [s] of a delay that is guessed closely; longer ones must show from afar
+FASTEST = 1e-3  # [s] between rows; in faster logs the guesses are no closer
 PER_ROW = 8  # guesses over one row
 TOGETHER = 24  # guesses that are simulated at once; bounds the memory
 PEAKS = 4  # from which a fit starts
@@ -53,8 +54,8 @@ def hides(fit: Fit, effect: str) -> bool:
 def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
     """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
     intervals = fitter.follower.log.intervals
-    step = float(np.median(intervals[intervals > 0.0])) / PER_ROW
-    guesses = np.arange(step, LONGEST, step)
+    row = max(float(np.median(intervals[intervals > 0.0])), FASTEST)
+    guesses = np.arange(row, max(PER_ROW * LONGEST, 2.0 * row), row) / PER_ROW
     values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)
     values[:, begin.parameters_of(DELAY)[0]] = guesses
     tried = [begin.at(cube) for cube in begin.space.to_cube(values)]

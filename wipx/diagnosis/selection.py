@@ -319,9 +319,10 @@ class Selection:
         values = [{**others, **start} for others in rough.beside(fit, starts[0].effect) for start in own]
         begins = [Hypothesis.of(self.setting, effects, each) for each in values]
         levels = self.fitter.spread_for(begins[0].model, fit.levels)
+        count = STARTS
         if starts[0].effect == rough.DELAY:
             begins += [guess for begin in begins[:: len(own)] for guess in rough.delays(self.fitter, begin, levels)]
-        count = rough.PEAKS if starts[0].effect == rough.DELAY else STARTS
+            count = rough.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)
         fits = [self.fitter.fit(begin, levels, steps=5) for begin in likeliest]
         if starts[0].effect.partition("/")[2] in rough.ROUGH:
