@@ -68,7 +68,9 @@ def case(effects: Effects, rng: np.random.Generator, noise: float = NOISE) -> Ca
 
 
 @pytest.mark.parametrize("name", NAMING)
-@pytest.mark.parametrize("effects", [COULOMB, VISCOUS], ids=["coulomb", "viscous"])
+@pytest.mark.parametrize(
+    "effects", [COULOMB, pytest.param(VISCOUS, marks=pytest.mark.slow)], ids=["coulomb", "viscous"]
+)
 def test_a_rival_finds_clear_friction_and_predicts_better(name: str, effects: Effects, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     given = case(effects, rng)

@@ -128,6 +128,7 @@ def test_the_toolbox_finds_nothing_where_nothing_is_missing(mujoco: Any, fresh_s
     assert not answer.found
 
 
+@pytest.mark.slow
 def test_an_uncertain_mass_is_corrected_and_not_named(mujoco: Any, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     true = robot("linear_axis", {"translation/viscous": {"sigma": 1.5}})

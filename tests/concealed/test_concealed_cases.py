@@ -70,6 +70,7 @@ def test_the_controller_stabilises_the_robot(kind: str):
     assert np.linalg.eigvals(a - b @ gains).real.max() < -0.3
 
 
+@pytest.mark.slow
 def test_a_seed_gives_the_same_case_and_another_seed_another_one(fresh_seed: int):
     once, again = (draw_case(np.random.default_rng(fresh_seed), "poor_logging") for _ in range(2))
     other = draw_case(np.random.default_rng(fresh_seed + 1), "poor_logging")

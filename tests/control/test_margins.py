@@ -144,6 +144,7 @@ def test_several_commands_have_no_margins_but_poles():
     check_stabilises(Lqr().law(model), model, 650.0)
 
 
+@pytest.mark.slow
 def test_the_region_of_loads_shows_what_each_controller_recovers_from(tmp_path: Path):
     model = heavy_robot()
     releases = Releases(masses=(1.2,), pitches=(-0.14, 0.05), duration=5.0, end=1.0)

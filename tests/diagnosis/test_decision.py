@@ -14,6 +14,7 @@ from wipx.diagnosis.nested import simple_law
 WIP = plant_of("wip")
 
 
+@pytest.mark.slow
 def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     robot = bench("linear_axis", {"translation/viscous": {"sigma": 1.0}}, fresh_seed)
     assert [effect.name for effect in robot.diagnosed().effects] == ["translation/viscous"]
@@ -50,6 +51,7 @@ def test_a_rich_law_has_a_simple_one_where_there_is_room():
     assert simple_law("pitch/viscous", (), WIP) is None
 
 
+@pytest.mark.slow
 def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
     robot = bench("linear_axis", hidden, fresh_seed)

@@ -67,7 +67,7 @@ def test_nothing_is_found_when_nothing_is_missing(kind: str, fresh_seed: int):
     assert dict(answer.location.sites) == {}
 
 
-@pytest.mark.parametrize("kind", ["wip", "pendulum"])
+@pytest.mark.parametrize("kind", ["wip", pytest.param("pendulum", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("log", LOGS)
 def test_a_poor_log_is_no_physics(log: str, kind: str, fresh_seed: int):
     well = bench(kind, {}, fresh_seed)
@@ -88,7 +88,14 @@ def test_one_effect_is_named_with_its_size(name: str, fresh_seed: int):
     assert all(answer.held_out.completed[c] < 0.3 * answer.held_out.nominal[c] for c in answer.held_out.completed)
 
 
-@pytest.mark.parametrize("log", ["coloured noise", "coarse encoders", "slow"])
+@pytest.mark.parametrize(
+    "log",
+    [
+        pytest.param("coloured noise", marks=pytest.mark.slow),
+        pytest.param("coarse encoders", marks=pytest.mark.slow),
+        "slow",
+    ],
+)
 def test_friction_is_named_in_a_poor_log(log: str):
     truth = {"translation/coulomb": {"F_c": 1.0}}
     well = bench("wip", truth, seed=5, count=3)
@@ -96,6 +103,7 @@ def test_friction_is_named_in_a_poor_log(log: str):
     assert_found(Bench(well.nominal, poorly, {}).diagnosed(), truth)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SIMPLE)
 def test_the_simplest_law_is_preferred(name: str, fresh_seed: int):
     kind, truth = SIMPLE[name]
@@ -106,12 +114,14 @@ def test_the_simplest_law_is_preferred(name: str, fresh_seed: int):
     )
 
 
+@pytest.mark.slow
 def test_a_peak_that_chance_makes_is_no_law():
     truth = {"translation/coulomb": {"F_c": 0.5}}
     # Noise of this seed looks like a static friction of 0.3 % more, worth half a nat beyond the penalty.
     assert_found(bench("wip", truth, seed=1442920172).diagnosed(), truth)
 
 
+@pytest.mark.slow
 def test_a_spring_and_its_damping_are_no_soft_bristle(fresh_seed: int):
     truth = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 0.5, "x0": 0.0}}
     assert_found(bench("linear_axis", truth, fresh_seed).diagnosed(), truth)
@@ -126,6 +136,7 @@ def test_two_effects_are_both_named(name: str, fresh_seed: int):
     assert sum(effect.share for effect in answer.effects) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_what_the_owner_knows_is_not_found_again():
     known = {"translation/coulomb": {"F_c": 0.5}}
     hidden = {"actuator/delay": {"tau": 0.008}}
@@ -135,6 +146,7 @@ def test_what_the_owner_knows_is_not_found_again():
     assert set(answer.model.effects) == {*known, *hidden}
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_they_are_said_to_be(fresh_seed: int):
     truth = 0.4
     rng = np.random.default_rng(fresh_seed)

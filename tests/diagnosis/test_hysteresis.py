@@ -20,7 +20,7 @@ def test_hysteresis_is_not_taken_for_bristles(fresh_seed: int):
         assert answer.held_out.completed[column] < 0.9 * nominal
 
 
-@pytest.mark.parametrize("damping", [0.0, 1.0])
+@pytest.mark.parametrize("damping", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_bristles_are_not_taken_for_hysteresis(damping: float, fresh_seed: int):
     hidden = {"translation/presliding": {**BRISTLES, "damping": damping}}
     answer = bench("linear_axis", hidden, fresh_seed).diagnosed()

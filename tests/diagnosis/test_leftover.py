@@ -19,6 +19,7 @@ def strange_force(size: float) -> dict[str, dict[str, float]]:
     return {"translation/remainder": {"signal": RATE_OF_CARRIAGE, "factor": 0.0, "low": -0.8, "high": 0.8, **forces}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wip", "linear_axis"])
 def test_a_force_without_a_name_is_flagged_and_stood_in_for(kind: str, fresh_seed: int):
     answer = bench(kind, strange_force(1.0), fresh_seed, count=4).diagnosed()

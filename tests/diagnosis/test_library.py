@@ -30,6 +30,7 @@ def content(answer: Diagnosis) -> tuple:
     return answer.verdict, answer.sentence, effects, answer.fit, answer.held_out, answer.bounds, answer.weak
 
 
+@pytest.mark.slow
 def test_a_folder_and_its_objects_give_the_same_answer(axis: Path):
     source = RecordingSource(path=str(axis))
     from_folder = wipx.diagnose(axis)

@@ -39,6 +39,7 @@ def test_bounds_hold_what_is_absent(fresh_seed: int):
     assert np.mean(held) > 0.6  # 0.95 of each, but many answer to the same chance
 
 
+@pytest.mark.slow
 def test_more_recordings_bound_more_tightly():
     few, many = (widths(bench("wip", {}, seed=10, count=count).diagnosed()) for count in (2, 8))
     ratios = [many[name] / few[name] for name in few.keys() & many.keys()]
@@ -62,6 +63,7 @@ def test_an_uncertain_mass_is_corrected_and_no_effect(well_known: Recordings):
     assert answer.model.parameters["body_mass"] == mass.value
 
 
+@pytest.mark.slow
 def test_an_uncertain_mass_is_corrected_beside_an_effect():
     hidden = {"translation/coulomb": {"F_c": 0.5}}
     answer = Bench(wrong_mass(1.08), recorded("wip", hidden, seed=10), {"body_mass": 0.1}).diagnosed()

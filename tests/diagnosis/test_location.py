@@ -16,6 +16,7 @@ def test_shares_of_sites_sum_to_one(fresh_seed: int):
     assert all(share > 0.0 for share in sites.values())
 
 
+@pytest.mark.slow
 def test_a_sticky_spot_is_put_on_the_rail(fresh_seed: int):
     hidden = {"translation/sticky_spot": {"F_c": 1.0, "lo": 0.0, "hi": 0.05}}
     answer = bench("linear_axis", hidden, fresh_seed, count=3).diagnosed()
@@ -54,6 +55,7 @@ def test_the_excess_adds_up_to_the_gain_in_squared_innovations():
     assert np.all(excess[~case.log.counted] == 0.0)
 
 
+@pytest.mark.slow
 def test_the_map_covers_every_recording():
     answer = bench("wip", {"translation/coulomb": {"F_c": 0.5}}, seed=9).diagnosed()
     pictured = answer.location.map

@@ -89,6 +89,7 @@ def test_noise_levels_come_back(fresh_seed: int):
     assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.2 + 4.5 * 0.14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pendulum", pytest.param("double_pendulum", marks=pytest.mark.slow)])
 def test_loops_stay_within_their_arrays(kind: str):
     """Compiled code does not check its indices; the same code does when it is not compiled."""

@@ -8,6 +8,7 @@ from wipx.diagnosis.places import ripples, sticky_spots
 from wipx.diagnosis.screening import basis_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("periods", [1.3, 5.0, 12.0])
 def test_ripple_is_found_at_any_number_of_periods(periods: float, fresh_seed: int):
     way = np.ptp(np.concatenate([r["theta"] for r in bench("pendulum", {}, fresh_seed).recordings]))

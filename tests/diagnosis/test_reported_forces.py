@@ -36,6 +36,7 @@ def test_a_reported_force_tells_a_late_drive_from_a_late_sensor(fresh_seed: int)
     assert known.parameters[0].value == pytest.approx(DELAY, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_drive_that_follows_its_command_leaves_the_delay_to_the_sensor(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     late = recorded("linear_axis", {"sensor_x/delay": {"tau": DELAY}}, fresh_seed)

@@ -47,6 +47,7 @@ def test_play_is_named(fresh_seed: int):
     assert 0.7 * gap.low <= TRUE["gap"] <= 1.3 * gap.high
 
 
+@pytest.mark.slow
 def test_a_delay_beside_play_is_no_soft_flank(fresh_seed: int):
     answer = bench("linear_axis", {PLAY: TRUE, "actuator/delay": {"tau": 4e-3}}, fresh_seed, count=3).diagnosed()
     assert answer.verdict == "mismatch"

@@ -111,6 +111,7 @@ def test_without_a_size_only_the_free_one_is_told(answer: Diagnosis):
     assert suspect.sentence.endswith("too little to be named.")
 
 
+@pytest.mark.slow
 def test_an_effect_that_cannot_be_told_from_a_found_one_takes_its_place():
     case = bench("wip", {"geometry/com_offset": {"theta_eq": 0.02}}, seed=3)
     (found,) = case.diagnosed().effects
@@ -120,6 +121,7 @@ def test_an_effect_that_cannot_be_told_from_a_found_one_takes_its_place():
     assert abs(suspect.parameters[0].value) == pytest.approx(abs(found.parameters[0].value), rel=0.05)
 
 
+@pytest.mark.slow
 def test_uncertain_numbers_make_up_for_a_suspected_size():
     case = axis()
     suspects = {"actuator/gain": {"k": 1.1}}

@@ -41,7 +41,7 @@ def test_it_is_one_beside_other_effects_too(fresh_seed: int):
     [
         {"translation/coulomb": {"F_c": 0.5}},
         {"actuator/delay": {"tau": 0.008}},
-        {"environment/rail_tilt": {"angle": 0.01}},
+        pytest.param({"environment/rail_tilt": {"angle": 0.01}}, marks=pytest.mark.slow),
     ],
     ids=["friction", "delay", "tilt"],
 )

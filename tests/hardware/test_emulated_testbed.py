@@ -230,7 +230,7 @@ def test_other_plants_stand_on_the_testbed_too(kind: str):
     assert run.duration > 0.29
 
 
-@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+@pytest.mark.parametrize("engine", [pytest.param("mujoco", marks=pytest.mark.slow), "pybullet"])
 def test_other_engines_move_the_same_robot(engine: Literal["mujoco", "pybullet"], heavy: Recording):
     pytest.importorskip(engine)
     assert BED.step <= 1e-4

@@ -51,6 +51,7 @@ def test_identified_friction_needs_an_earlier_model():
         variant("identified").given(WIP, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("option", [name for name in OPTIONS if name not in ("none", "identified")])
 def test_every_variant_brings_the_predictions_down_to_the_noise(option: str):
     hidden = {"pitch/coulomb": {"F_c": 0.06}, "pitch/viscous": {"sigma": 0.02}}

@@ -28,7 +28,7 @@ def values_of(problem: ClosedLoopProblem, model: Model) -> np.ndarray:
     return np.array([model.value(name) for name in problem.space.names])
 
 
-@pytest.mark.parametrize("fresh", [False, True], ids=["fixed", "fresh"])
+@pytest.mark.parametrize("fresh", [pytest.param(False, marks=pytest.mark.slow), True], ids=["fixed", "fresh"])
 def test_all_twelve_numbers_come_back_within_their_intervals(fresh: bool, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed if fresh else 1)
     truth = paper_robot(rng)

@@ -41,7 +41,7 @@ def assert_found(estimates: tuple[Estimate, ...], effects: Effects) -> None:
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("fresh", [False, True], ids=["fixed", "fresh"])
+@pytest.mark.parametrize("fresh", [pytest.param(False, marks=pytest.mark.slow), True], ids=["fixed", "fresh"])
 def test_known_effects_come_back(name: str, fresh: bool, fresh_seed: int):
     kind, effects = CASES[name]
     nominal = nominal_model(kind)

@@ -86,6 +86,7 @@ def test_least_squares_finds_all_that_a_quiet_window_tells():
     np.testing.assert_allclose(masses, test.loads[sideways, 0], atol=0.02)  # kg; of float32 windows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECIPES)
 @pytest.mark.parametrize("length", [40, 80])
 def test_physics_beats_a_regression_on_few_robots(name: str, length: int, training: TrainingSet, ready):

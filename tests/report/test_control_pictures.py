@@ -17,6 +17,7 @@ def test_errors_of_all_loads_are_drawn(tmp_path: Path):
         assert min(picture.size) > 500
 
 
+@pytest.mark.slow
 def test_the_moving_picture_is_small_and_lasts_as_long_as_the_motion(tmp_path: Path):
     path = tmp_path / "control.gif"
     animate([result("lqr", heavy_stops=True), result("lqr_equilibrium", (0.2, 0.3), off=0.0)], "b5", path)

@@ -56,6 +56,7 @@ def test_a_finished_job_is_not_repeated_and_one_with_other_settings_is_refused(p
     assert "seed (0 before, 7 now)" in other.error
 
 
+@pytest.mark.slow
 def test_a_sweep_gives_a_table_and_one_with_a_failed_job_does_not(program: Program, tmp_path: Path):
     sweep = ("task=adapt", *ROBOT, "name=gap", "label='${hydra:runtime.choices.method}'", *SEARCH, "-m")
     assert program(*sweep, "method=pure_sim,ours").status == 0
@@ -101,6 +102,7 @@ def test_the_friction_figure_shows_the_papers_curve(program: Program, tmp_path: 
     assert "F_x" in refused.error
 
 
+@pytest.mark.slow
 def test_a_model_that_was_completed_before_is_taken_as_it_is(program: Program, tmp_path: Path):
     assert program("task=adapt", "method=ours", *ROBOT, *SEARCH, "hydra.run.dir=ours").status == 0
     path = "model.path=ours/model.yaml"

@@ -207,6 +207,7 @@ def test_a_sweep_that_lacks_a_controller_or_mixes_experiments_is_refused():
         by_scenario([whole[0], replace(whole[1], rail=1.8)], sweep, ("lqr", "lqr_equilibrium"))
 
 
+@pytest.mark.slow
 def test_tables_pictures_and_film_come_from_a_finished_sweep(program: Program, tmp_path: Path):
     controllers = [result("lqr", heavy_stops=True), result("lqr_equilibrium", (0.2, 0.3), off=0.01)]
     methods = [result("lqr_equilibrium", method=m, off=o) for m, o in (("pure_sim", 0.04), ("ours", 0.01))]

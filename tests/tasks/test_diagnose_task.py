@@ -119,6 +119,7 @@ def test_a_model_that_is_complete_is_consistent(program, tmp_path: Path):
     assert data["unexplained"]["site"] is None
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer(program, axis: Path, tmp_path: Path):
     answers = []
     for out in ("first", "second"):

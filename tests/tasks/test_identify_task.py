@@ -41,6 +41,7 @@ def test_a_pendulum_is_completed_and_its_model_predicts(program, examples: Path,
     assert seen["rms"]["theta"] < 0.1 * seen["rms_nominal"]["theta"]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_model(program, folder, tmp_path: Path):
     arguments = (*FAST, "optimizer.starts=2", "optimizer.sample=8", f"recordings.path={folder.path}")
     for out in ("first", "second"):
@@ -60,6 +61,7 @@ def test_an_earlier_model_gives_its_friction(program, folder, tmp_path: Path):
     assert set(model["effects"]) == {"pitch/coulomb", "pitch/viscous"}
 
 
+@pytest.mark.slow
 def test_the_run_is_logged(program, folder, tmp_path: Path):
     arguments = (f"recordings.path={folder.path}", "hydra.run.dir=out", "tracking.folder=tracked")
     answer = program(*FAST, *arguments, tracking="mlflow")

@@ -32,6 +32,7 @@ QUICK = (
 )
 
 
+@pytest.mark.slow
 def test_margins_and_recovered_loads_come_from_the_command_line_once(program: Program, tmp_path: Path):
     another = "+controller@task.controllers.adaptive=lqr_equilibrium_adaptive"
     answer = program(*QUICK, another)

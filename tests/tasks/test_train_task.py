@@ -22,6 +22,7 @@ SMALL = (
 )
 
 
+@pytest.mark.slow
 def test_an_estimator_is_judged_on_simulated_and_on_recorded_robots(program: Program, tmp_path: Path):
     answer = program(*SMALL, "estimator=momentum_observer", "hydra.run.dir=job")
     assert answer.status == 0, answer.error
