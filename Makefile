@@ -64,14 +64,17 @@ fig-friction: $(READY)  ## the paper's Fig. 3: its joint model beside Coulomb an
 fig-margins: $(READY)  ## stability margins of all controllers, and the loads from which they recover
 	$(PY) -m wipx +experiment=margins
 
+# A process of the tests has one core; threads of linear algebra on small matrices would only wait for each other.
+ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+
 test: $(READY)  ## run the tests (without the slow ones)
-	$(PY) -m pytest -q -n auto -m "not slow"
+	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow"
 
 test-slow: $(READY)  ## run the slow tests
 	$(PY) -m pytest -q -m slow
 
 test-bounds: $(READY)  ## run the tests with compiled code that checks its indices (slow)
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q -n auto -m "not slow"
+	$(ONE_THREAD) NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q -n auto -m "not slow"
 
 check: $(READY)  ## lint, formatting and types
 	$(PY) -m ruff check
