@@ -7,9 +7,11 @@ from diagnosis.recorded import Bench, bench, slow
 from wipx.core.plant import plant_of
 from wipx.diagnosis import decision, numbers
 from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape
 from wipx.diagnosis.nested import simple_law
+from wipx.diagnosis.selection import Selection
 
 WIP = plant_of("wip")
 
@@ -59,3 +61,13 @@ def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pyt
     answer = robot.diagnosed()
     assert {effect.name for effect in answer.effects} == set(hidden)
     assert answer.verdict == "mismatch"
+
+
+def test_one_effect_takes_the_place_of_two_that_imitate_it(fresh_seed: int):
+    case = bench("wip", {"sensor_theta/scale": {"e": 0.06}}, fresh_seed)
+    selection = Selection(case.fitter, case.setting, case.fit())
+    rescaled = {"sensor_x/scale.e": -0.06, "actuator/gain.k": 1.06}  # a linear robot looks the same at another scale
+    hypothesis = Hypothesis.of(case.setting, ("sensor_x/scale", "actuator/gain"), rescaled)
+    two = case.fitter.polished(case.fitter.fit(hypothesis, selection.nominal.levels))
+    assert selection.evidence(selection.nominal, two) > 100.0
+    assert selection.exchanged(two).effects == ("sensor_theta/scale",)

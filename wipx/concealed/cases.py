@@ -183,6 +183,8 @@ def realise(choice: Choice, rng: np.random.Generator) -> Case | None:
     if runs is None:
         return None
     seen = runs[: len(shown)]
+    if not _visited(hidden, seen):
+        return None
     contrast = _contrasts(robot, parameters, real, hidden, visible, seen, settings)
     least = SHOWS["weak" if draw.weak else "outside" if hidden.oddity else "clear"]
     if contrast is None or any(max(signals.values()) < least for signals in contrast.values()):
@@ -255,6 +257,16 @@ def _hidden(choice: Choice, draw: Draw) -> Hidden:
     details = {name: draw_details(name, values, draw) for name, values in effects.items()}
     oddity = None if choice.oddity is None else draw_oddity(choice.oddity, draw)
     return Hidden(effects, details, oddity)
+
+
+def _visited(hidden: Hidden, runs: tuple[Run, ...]) -> bool:
+    """Whether every sticky spot lies where a run comes by, also where other effects move the robot elsewhere.
+
+    Its contrast would not tell: where a joint sticks besides, runs also differ that differ by rounding alone.
+    """
+    spots = [values for name, values in hidden.effects.items() if name.endswith("/sticky_spot")]
+    places = np.concatenate([run.exact["x"] for run in runs]) if spots else np.empty(0)
+    return all(((spot["lo"] <= places) & (places <= spot["hi"])).any() for spot in spots)
 
 
 def _contrasts(

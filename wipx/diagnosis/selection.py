@@ -272,9 +272,22 @@ class Selection:
                 if found is not None and self._lead(found, fit) > most and self.worthwhile(base, found):
                     best, most = found, self._lead(found, fit)
             if best is fit:
+                best = self._with_fewer(fit)
+            if best is fit:
                 break
             self._fits[frozenset(best.effects)] = best
             fit = self.pruned(self.settled(best))
+        return fit
+
+    def _with_fewer(self, fit: Fit) -> Fit:
+        """A fit in which one effect does the work of two that is hardly worse; the fit itself where there is none."""
+        for effect in fit.effects if len(fit.effects) > 1 else ():
+            for found in self.replacements(fit, effect):
+                if set(found.effects) == set(fit.effects) or self._lead(fit, found) > LEAST_LEAD:
+                    continue
+                fewer = self.pruned(found)
+                if len(fewer.effects) < len(fit.effects) and self._lead(fit, fewer) < LEAST_GAIN:
+                    return fewer
         return fit
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
