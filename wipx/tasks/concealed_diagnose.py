@@ -143,11 +143,19 @@ def check_methods(methods: Iterable[str]) -> None:
     Raises:
         InputError: the program does not know one of them.
     """
-    for method in methods:
-        command = [sys.executable, "-m", "wipx", *_task(method), "--cfg", "job"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            raise InputError(f"task.rivals: {method}: {_last_line(done.stderr)}")
+    begun = {
+        method: subprocess.Popen(
+            [sys.executable, "-m", "wipx", *_task(method), "--cfg", "job"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for method in methods
+    }
+    errors = {method: process.communicate()[1] for method, process in begun.items()}
+    for method, process in begun.items():
+        if process.returncode != 0:
+            raise InputError(f"task.rivals: {method}: {_last_line(errors[method])}")
 
 
 def _task(method: str) -> list[str]:

@@ -1,23 +1,29 @@
 """Third process of a concealed run: opens seals of answered cases, checks every digest, and scores."""
 
-import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from wipx.concealed.folder import RunFolder, read_json
 from wipx.concealed.score import CaseScore, ParameterScore, UnseenErrors, failed, score
 from wipx.concealed.seal import Commitment, digest_of_folder, unseal
 from wipx.concealed.write import write_files
 from wipx.core.errors import InputError
-from wipx.recordings.model_file import write_model
+from wipx.core.model import Model
+from wipx.core.results import FitErrors
+from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.concealed_diagnose import ONE_THREAD, Answer, read_answers
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.tasks.concealed_diagnose import Answer, read_answers
+from wipx.tasks.predict import Predict
 from wipx.tasks.results import write_json
 from wipx.tasks.rival import NETWORK
+
+SIMULATOR = AnalyticSimulator(threads=1)
 
 
 @dataclass(frozen=True)
@@ -104,42 +110,41 @@ class Unseen:
     """The unseen recordings of an opened case, and how well they can be predicted.
 
     Attributes:
-        private: Folder for them and for the predictions.
         floor: Errors that the true model leaves, where the vocabulary has it, and never less than the sensors' noise
             with what it does to the state from which a prediction starts, by signal [m, rad].
     """
 
     def __init__(self, private: Path, content: Mapping[str, Any]) -> None:
-        self.private = private
         write_files(private / "recordings", content["unseen"])
+        source = RecordingSource(path=str(private / "recordings"))
+        self._nominal, self._recordings = source.describe().model, source.load()
         truth = content["truth"]
-        nominal = RecordingSource(path=str(private / "recordings")).describe().model
         hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
-        write_model(nominal.with_values(truth["true_parameters"]).with_effects(hidden), private / "model.yaml")
-        predicted = self._predicted(private) or {"rms": {}, "noise_floor": {}}
-        best = {} if truth["outside"] else predicted["rms"]
+        true = self._predicted(self._nominal.with_values(truth["true_parameters"]).with_effects(hidden))
+        floor, best = ({}, {}) if true is None else (true.noise_floor, true.completed)
         self.floor = {
-            name: max(noise, predicted["noise_floor"].get(name) or 0.0, best.get(name) or 0.0)
+            name: float(np.nanmax([noise, floor.get(name, 0.0), 0.0 if truth["outside"] else best.get(name, 0.0)]))
             for name, noise in truth["noise"].items()
         }
 
     def errors(self, answer: Path) -> UnseenErrors | None:
         """Errors of the nominal model and of a method's; None where the recordings cannot be predicted."""
-        metrics = self._predicted(answer)
-        if metrics is None or None in (*metrics["rms"].values(), *metrics["rms_nominal"].values()):
+        network = answer / NETWORK
+        try:
+            model = read_model(answer / "model.yaml")
+        except InputError:
             return None
-        return UnseenErrors(metrics["rms_nominal"], metrics["rms"], self.floor)
+        found = self._predicted(model, str(network) if network.is_file() else None)
+        if found is None or not np.isfinite([*found.completed.values(), *found.nominal.values()]).all():
+            return None
+        return UnseenErrors(found.nominal, found.completed, self.floor)
 
-    def _predicted(self, answer: Path) -> dict[str, Any] | None:
-        """Content of metrics.json for the model.yaml in a folder; None where the prediction fails."""
-        out = self.private / "prediction" / answer.name
-        command = [sys.executable, "-m", "wipx", "task=predict", "tracking=none", "sim.threads=1"]
-        command += [f"recordings.path='{self.private / 'recordings'}'", f"hydra.run.dir='{out}'"]
-        command += [f"model.path='{answer.resolve() / 'model.yaml'}'"]
-        if (answer / NETWORK).is_file():
-            command += [f"task.residual='{answer.resolve() / NETWORK}'"]
-        done = subprocess.run(command, capture_output=True, check=False, env=ONE_THREAD)
-        return read_json(out / "metrics.json") if done.returncode == 0 else None
+    def _predicted(self, model: Model, residual: str | None = None) -> FitErrors | None:
+        """What `task=predict` has in metrics.json; None where the prediction fails."""
+        try:
+            return Predict(residual=residual).compared(self._nominal, model, self._recordings, SIMULATOR)[0]
+        except (InputError, ArithmeticError, np.linalg.LinAlgError):
+            return None
 
 
 def read_commitments(folder: RunFolder) -> dict[str, Commitment]:

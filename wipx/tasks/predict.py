@@ -7,6 +7,8 @@ import numpy as np
 
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
+from wipx.core.recording import Recording
+from wipx.core.results import FitErrors, Trace
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.model_file import read_model
@@ -43,13 +45,7 @@ class Predict:
                 f"{job.model_path}: a model of plant {model.plant.kind}, "
                 f"expected {nominal.plant.kind} as in {source.name}"
             )
-        recordings = source.load()
-        judge = Judge(job.part("sim"), sensor_noise(recordings, model.plant), HORIZON, self.lead)
-        errors, traces = judge.compare(nominal, model, recordings, held_out=True)
-        if self.residual is not None:
-            learned = replace(judge, simulator=self._learned(model, judge.noise))
-            beside, traces = learned.compare(model, model, recordings, held_out=True)
-            errors = replace(errors, completed=beside.completed, noise_floor=beside.noise_floor)
+        errors, traces = self.compared(nominal, model, source.load(), job.part("sim"))
         columns = model.plant.coordinates
         with written_together(job.out) as folder:
             for trace in traces:
@@ -71,6 +67,22 @@ class Predict:
             )
         figures = ", ".join(f"{n} {errors.completed[n]:.4g} {model.plant.unit_of(n)}" for n in columns)
         print(f"rms error of {errors.windows} predictions over {HORIZON:g} s: {figures}; written to {job.out}")
+
+    def compared(
+        self, nominal: Model, model: Model, recordings: tuple[Recording, ...], simulator: Simulator
+    ) -> tuple[FitErrors, tuple[Trace, ...]]:
+        """Errors of two models on the same windows, the second with the learned acceleration, and what they predicted.
+
+        Raises:
+            InputError: the recordings are too short, or the learned acceleration is none of this robot.
+        """
+        judge = Judge(simulator, sensor_noise(recordings, model.plant), HORIZON, self.lead)
+        errors, traces = judge.compare(nominal, model, recordings, held_out=True)
+        if self.residual is None:
+            return errors, traces
+        learned = replace(judge, simulator=self._learned(model, judge.noise))
+        beside, traces = learned.compare(model, model, recordings, held_out=True)
+        return replace(errors, completed=beside.completed, noise_floor=beside.noise_floor), traces
 
     def _learned(self, model: Model, noise: np.ndarray) -> Simulator:
         """The simulator with the learned acceleration."""
