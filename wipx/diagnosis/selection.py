@@ -285,9 +285,11 @@ class Selection:
             for found in self.replacements(fit, effect):
                 if set(found.effects) == set(fit.effects) or self._lead(fit, found) > LEAST_LEAD:
                     continue
+                told = len(self.considered)
                 fewer = self.pruned(found)
                 if len(fewer.effects) < len(fit.effects) and self._lead(fit, fewer) < LEAST_GAIN:
                     return fewer
+                del self.considered[told:]  # nothing of the answer is superfluous
         return fit
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
