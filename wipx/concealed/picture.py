@@ -34,7 +34,8 @@ def draw_confusions(counts: Mapping[tuple[str, str], int], path: Path) -> None:
         total = sum(number for (name, _), number in counts.items() if name == true)
         colour = RIGHT if is_right(true, answered) else WRONG
         axes.add_patch(_cell(column, row, colour, count / total))
-        axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color="white")
+        ink = "white" if count > 0.5 * total else "black"
+        axes.text(column, row, str(count), ha="center", va="center", fontsize=8, color=ink)
     axes.set_xticks(np.arange(len(answers)), answers, rotation=90, fontsize=8, color=MUTED)
     axes.set_yticks(np.arange(len(hidden)), hidden, fontsize=8, color=MUTED)
     axes.set_xlabel("answered", color=MUTED)
