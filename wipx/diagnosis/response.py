@@ -64,34 +64,46 @@ def response(fitter: Fitter, fit: Fit, joint: int, forces: np.ndarray) -> np.nda
         log.channels,
         gains.gains,
         gains.whitening,
-        forces,
-    )
+        np.ascontiguousarray(forces.T),
+    ).T
     return whitened_change(innovations, fit.colour, log).reshape(len(forces), -1).T
 
 
 @cached
 def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
-    columns, rows, recordings = forces.shape
+    """White innovations (K + 1, m, R, C) that forces (R, K + 1, C) cause; all columns of a row lie side by side."""
+    recordings, rows, columns = forces.shape
     joints = a.shape[1]
     n, m = 2 * joints, len(channels)
-    out = np.zeros((columns, recordings, m, rows))
-    transition, push = np.zeros((n, n)), np.zeros(n)
-    correction, show = np.eye(n), np.zeros((m, n))
+    out = np.zeros((rows, m, recordings, columns))
+    transition, kept, show = np.zeros((n, n)), np.zeros((n, n)), np.zeros((m, n))
     for r in range(recordings):
-        states = np.zeros((n, columns))
+        states, moved = np.zeros((n, columns)), np.zeros((n, columns))
         for k in range(last[r] + 1):
-            for c in range(m):
-                show[:, channels[c]] = -whitening[k, r, :, c]
-                correction[:, channels[c]] = -gains[k, r, :, channels[c]]
-                correction[channels[c], channels[c]] += 1.0
-            shown = show @ states
             for d in range(m):
-                out[:, r, d, k] = shown[d]
+                for i in range(m):
+                    show[d, channels[i]] = -whitening[k, r, d, i]
+            _add_product(out[k, :, r], show, states)
             if k == last[r]:
                 break
             dt, g = intervals[k, r], place[k, r]
             transition_over(a[g], dt, transition)
+            kept[:] = transition
+            _add_product(kept, transition, -gains[k, r])
             for i in range(joints):
-                push[i], push[joints + i] = 0.5 * dt * dt * b[g, i], dt * b[g, i]
-            states = (transition @ correction) @ states + np.outer(push, forces[:, k, r])
+                for c in range(columns):
+                    rate = dt * b[g, i] * forces[r, k, c]
+                    moved[i, c], moved[joints + i, c] = 0.5 * dt * rate, rate
+            _add_product(moved, kept, states)
+            states, moved = moved, states
     return out
+
+
+@cached
+def _add_product(total, weights, states):
+    """Add the product of two matrices; the second has many columns."""
+    for i in range(len(total)):
+        for j in range(len(states)):
+            weight = weights[i, j]
+            for c in range(states.shape[1]):
+                total[i, c] += weight * states[j, c]
