@@ -10,6 +10,7 @@ from wipx.concealed.oddities import draw_oddity, oddity_names
 from wipx.concealed.physics import DRIVEN, MOVING, Hidden, physics
 from wipx.concealed.robots import Robot, draw_robot
 from wipx.concealed.scenario import (
+    LENGTHS,
     UNSEEN,
     VISIBLE,
     LogSettings,
@@ -133,12 +134,12 @@ def _apportioned(seats: int, weights: np.ndarray) -> np.ndarray:
     return given
 
 
-def draw_case(rng: np.random.Generator, tier: str) -> Case:
-    """A case of a tier."""
+def draw_case(rng: np.random.Generator, tier: str, lengths: tuple[float, float] = LENGTHS) -> Case:
+    """A case of a tier; each of its recordings lasts a time between the two `lengths` [s]."""
     while True:
         choice = choose(rng, tier)
         for _ in range(ATTEMPTS):
-            case = realise(choice, rng)
+            case = realise(choice, rng, lengths)
             if case is not None:
                 return case
 
@@ -164,13 +165,13 @@ def _compatible(plant: str, count: int, tier: str, rng: np.random.Generator) -> 
     return tuple(names)
 
 
-def realise(choice: Choice, rng: np.random.Generator) -> Case | None:
+def realise(choice: Choice, rng: np.random.Generator, lengths: tuple[float, float] = LENGTHS) -> Case | None:
     """A robot with that physics and its recordings; None where it falls or where the physics does not show."""
     robot = draw_robot(choice.plant, rng)
     settings = draw_log_settings(choice.plant, rng, poor=choice.tier == "poor_logging")
     shown = _visible_excitations(rng)
-    scenarios = tuple(draw_scenario(robot, settings, name, rng) for name in (*shown, *UNSEEN))
-    visible = scenarios[: len(shown)]
+    scenarios = tuple(draw_scenario(robot, settings, name, rng, lengths) for name in (*shown, *UNSEEN))
+    visible, later = scenarios[: len(shown)], scenarios[len(shown) :]
     nominal = _record(robot, robot.parameters, Hidden(), visible, settings)
     if nominal is None:
         return None
@@ -179,15 +180,15 @@ def realise(choice: Choice, rng: np.random.Generator) -> Case | None:
     parameters, uncertainty = _wrong(choice, robot, rng)
     hidden = _hidden(choice, draw)
     real = Hidden({**known, **hidden.effects}, hidden.details, hidden.oddity)
-    runs = _record(robot, parameters, real, scenarios, settings)
-    if runs is None:
-        return None
-    seen = runs[: len(shown)]
-    if not _visited(hidden, seen):
+    seen = _record(robot, parameters, real, visible, settings)
+    if seen is None or not _visited(hidden, seen):
         return None
     contrast = _contrasts(robot, parameters, real, hidden, visible, seen, settings)
     least = SHOWS["weak" if draw.weak else "outside" if hidden.oddity else "clear"]
     if contrast is None or any(max(signals.values()) < least for signals in contrast.values()):
+        return None
+    unseen = _record(robot, parameters, real, later, settings)
+    if unseen is None:
         return None
     return Case(
         choice.tier,
@@ -198,7 +199,7 @@ def realise(choice: Choice, rng: np.random.Generator) -> Case | None:
         hidden,
         settings,
         seen,
-        runs[len(shown) :],
+        unseen,
         (*shown, *UNSEEN),
         contrast,
     )

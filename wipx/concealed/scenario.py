@@ -15,6 +15,7 @@ VISIBLE = ("release", "sine", "slow", "multisine", "steps", "chirp")
 UNSEEN = ("release", "two_sines", "disturbed_steps")
 AMPLITUDE = {"wip": 0.12, "cartpole": 0.12, "linear_axis": 0.2, "pendulum": 0.2, "double_pendulum": 0.4}
 RELEASED = {"wip": 0.06, "cartpole": 0.06, "linear_axis": 0.25, "pendulum": 0.22, "double_pendulum": 0.6}
+LENGTHS = (8.0, 12.0)  # [s]
 LIMITS = {"double_pendulum": (3.0, 3.0)}  # others: 2 m and 0.5 rad
 
 
@@ -105,11 +106,17 @@ def draw_log_settings(kind: str, rng: np.random.Generator, *, poor: bool) -> Log
     )
 
 
-def draw_scenario(robot: Robot, settings: LogSettings, excitation: str, rng: np.random.Generator) -> Scenario:
-    """A run of that excitation for a robot."""
+def draw_scenario(
+    robot: Robot,
+    settings: LogSettings,
+    excitation: str,
+    rng: np.random.Generator,
+    lengths: tuple[float, float] = LENGTHS,
+) -> Scenario:
+    """A run of that excitation for a robot; it lasts a time between the two `lengths` [s]."""
     lead = 0.0 if excitation == "release" else rng.uniform(0.05, 0.5)
     first = round(lead * robot.rate)
-    count = first + int(rng.uniform(8.0, 12.0) * robot.rate)
+    count = first + int(rng.uniform(*lengths) * robot.rate)
     steps = (1.0 + settings.jitter * np.clip(rng.standard_normal(count), -3.0, 3.0)) / robot.rate
     instants = np.concatenate(([0.0], np.cumsum(steps)))
     instants -= instants[first]

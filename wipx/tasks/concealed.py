@@ -24,6 +24,7 @@ from tqdm import tqdm
 
 from wipx.concealed.cases import TIERS, stratified
 from wipx.concealed.folder import RunFolder, read_json
+from wipx.concealed.scenario import LENGTHS
 from wipx.core.errors import InputError, unknown_name
 from wipx.tasks.concealed_diagnose import OURS, Diagnosers, check_methods, now
 from wipx.tasks.concealed_draw import draw_and_seal
@@ -36,6 +37,7 @@ from wipx.tasks.results import write_json
 EARLIER = "earlier"  # folder that takes finished runs
 DRAWING = ".drawing"  # folder of cases that are not all sealed yet
 RUNNING = "running.pid"
+SHORTEST, LONGEST = 4.0, 60.0  # [s], of recordings: in less the slow excitations hardly move a robot
 PARTS = ("recordings", "sealed", "answers", "opened")
 
 
@@ -65,6 +67,7 @@ class Concealed:
     Attributes:
         cases: How many.
         seed: Of the draws; None for a fresh one.
+        lengths: Shortest and longest time that a recording lasts [s].
         workers: Processes that draw and diagnose.
         tiers: Tiers to draw from; empty for all.
         rivals: Other methods that diagnose the same recordings, options of the group `rival`.
@@ -75,6 +78,7 @@ class Concealed:
 
     cases: int = 30
     seed: int | None = None
+    lengths: tuple[float, float] = LENGTHS
     workers: int = 2
     tiers: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
@@ -88,6 +92,11 @@ class Concealed:
                 raise InputError(f"{name} is {value}, expected 1 or more")
         if self.rivals_cases < 0:
             raise InputError(f"task.rivals_cases is {self.rivals_cases}, expected 0 or more")
+        if len(self.lengths) != 2 or not SHORTEST <= self.lengths[0] <= self.lengths[1] <= LONGEST:
+            raise InputError(
+                f"task.lengths is {list(self.lengths)}, expected the shortest and the longest time of a recording, "
+                f"both from {SHORTEST:g} to {LONGEST:g} s"
+            )
         for tier in self.tiers:
             if tier not in TIERS:
                 raise unknown_name("tier", tier, TIERS, "task.tiers")
@@ -117,6 +126,7 @@ class Concealed:
         tiers, compared = self.tiers or tuple(TIERS), self._compared
         return {
             "cases": self.cases,
+            "lengths": list(self.lengths),
             "tiers": list(tiers),
             "rivals": list(self.rivals) if compared else [],
             "rivals_cases": compared,
@@ -165,7 +175,7 @@ class Concealed:
         names = [f"case{number:04d}" for number in range(1, self.cases + 1)]
         with _processes(self.workers) as pool:
             begun = [
-                pool.submit(draw_and_seal, draft.path, name, tier, seed)
+                pool.submit(draw_and_seal, draft.path, name, tier, seed, self.lengths)
                 for name, tier in zip(names, tiers, strict=True)
             ]
             sealed = sorted(_shown(begun, "draw and seal"), key=lambda one: one.commitment.case)

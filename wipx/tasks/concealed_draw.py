@@ -11,7 +11,7 @@ from wipx.concealed.seal import Sealed, seal
 from wipx.concealed.write import case_files, write_files
 
 
-def draw_and_seal(path: Path, case: str, tier: str, seed: int) -> Sealed:
+def draw_and_seal(path: Path, case: str, tier: str, seed: int, lengths: tuple[float, float]) -> Sealed:
     """Draw a case, write its visible recordings and its seal; the key is on no disk, only in what is returned.
 
     Args:
@@ -19,10 +19,11 @@ def draw_and_seal(path: Path, case: str, tier: str, seed: int) -> Sealed:
         case: Name of the case.
         tier: Its tier.
         seed: Of the run.
+        lengths: Shortest and longest time that a recording lasts [s].
     """
     folder = RunFolder(path)
     own = seed_of(seed, case)
-    files = case_files(draw_case(np.random.default_rng(own), tier))
+    files = case_files(draw_case(np.random.default_rng(own), tier, lengths))
     sealed = seal(case, files.visible, {"seed": own, "truth": files.truth, "unseen": files.unseen})
     write_files(folder.recordings(case), files.visible)
     folder.seal(case).parent.mkdir(parents=True, exist_ok=True)
