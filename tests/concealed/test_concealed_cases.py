@@ -91,6 +91,13 @@ def test_where_nothing_is_missing_the_robot_is_the_nominal_one():
     assert not case.uncertainty
 
 
+def test_recordings_last_as_long_as_is_asked(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    choice = Choice("nothing", "linear_axis", ())
+    case = next(case for case in (realise(choice, rng, (4.0, 5.0)) for _ in range(20)) if case is not None)
+    assert all(3.8 < run.columns["t"][-1] < 5.2 for run in (*case.visible, *case.unseen))
+
+
 def test_effects_that_no_recording_tells_apart_are_not_hidden_together(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     drawn = [set(choose(rng, "triple").names) for _ in range(4000)]

@@ -31,6 +31,7 @@ def test_one_switch_chooses_the_size(profile: str, cases: int):
         ("+experiment=conceald", "experiment: unknown option 'conceald'; did you mean concealed?"),
         ("profile=ful", "profile: unknown option 'ful'; did you mean full?"),
         ("task.cases=0", "task.cases is 0, expected 1 or more"),
+        ("task.lengths=[7,5]", "task.lengths is [7.0, 5.0], expected the shortest and the longest time of a recording"),
         ("task.tiers=[single]", "task.tiers: unknown tier 'single'"),
     ],
 )
