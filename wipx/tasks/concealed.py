@@ -92,7 +92,7 @@ class Concealed:
                 raise InputError(f"{name} is {value}, expected 1 or more")
         if self.rivals_cases < 0:
             raise InputError(f"task.rivals_cases is {self.rivals_cases}, expected 0 or more")
-        if len(self.lengths) != 2 or not SHORTEST <= self.lengths[0] <= self.lengths[1] <= LONGEST:
+        if not SHORTEST <= self.lengths[0] <= self.lengths[1] <= LONGEST:
             raise InputError(
                 f"task.lengths is {list(self.lengths)}, expected the shortest and the longest time of a recording, "
                 f"both from {SHORTEST:g} to {LONGEST:g} s"
