@@ -51,12 +51,13 @@ def open_loop(
     extra = nothing.copy()
     if command is not None:
         extra[:, 1 if kind == "pendulum" else 0] = command
-    reached, _shown, q, v, _commands, forces = simulate(
+    reached, _shown, q, v, _commands, forces, _states = simulate(
         physics(kind, BODIES[kind], hidden or Hidden())[0],
         np.array(start),
         np.arange(rows + 1) / rate,
         np.zeros((rows, 4)),
         extra,
+        np.zeros((rows, 4)),
         nothing,
         nothing,
         np.array((False, False)),

@@ -25,7 +25,7 @@ def short(scenario):
     """The first seconds of a scenario."""
     rows = scenario.rows[scenario.instants[scenario.rows] < SECONDS]
     end = int(scenario.rows[len(rows)])
-    parts = {name: getattr(scenario, name)[:end] for name in ("reference", "extra", "noise", "rate_noise")}
+    parts = {name: getattr(scenario, name)[:end] for name in ("reference", "extra", "noise", "rate_noise", "waves")}
     noise = scenario.force_noise[: len(rows)]
     return replace(scenario, rows=rows, end=end, instants=scenario.instants[: end + 1], force_noise=noise, **parts)
 

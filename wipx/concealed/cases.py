@@ -31,6 +31,7 @@ TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hol
     "wrong_parameters": 0.05,
     "poor_logging": 0.05,
 }
+DIRTY_TIERS = {"dirty": 0.75, "dirt_only": 0.25}  # robots that keep to no law, see `dirty`
 PLANT_SHARES = {"wip": 0.6, "cartpole": 0.12, "pendulum": 0.12, "linear_axis": 0.08, "double_pendulum": 0.08}
 KNOWN_SHARE = 0.15  # of robots whose owner knows the viscous friction of a joint
 SHOWS = {
@@ -64,6 +65,7 @@ class Case:
         unseen: Recordings to judge the completed model by.
         excitations: Of the visible recordings, then of the unseen ones.
         contrast: Root mean square difference that each hidden effect makes, over the noise, by effect and signal.
+        dirt: What keeps to no law and how much it matters, see `dirty.account`; None for an exact robot.
     """
 
     tier: str
@@ -77,6 +79,7 @@ class Case:
     unseen: tuple[Run, ...]
     excitations: tuple[str, ...]
     contrast: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    dirt: Mapping[str, object] | None = None
 
     def noise(self) -> dict[str, float]:
         """Standard deviation of the sensors' noise, with that of their resolution, by coordinate's column."""
@@ -116,10 +119,10 @@ def stratified(cases: int, first: int, tiers: tuple[str, ...], rng: np.random.Ge
     Args:
         cases: How many.
         first: Cases at the beginning that are to be a sample of all tiers too.
-        tiers: Those to choose from, keys of `TIERS`.
+        tiers: Those to choose from, keys of `TIERS` or of `DIRTY_TIERS`.
         rng: Of the order.
     """
-    everywhere = _apportioned(cases, np.array([TIERS[tier] for tier in tiers]))
+    everywhere = _apportioned(cases, np.array([{**TIERS, **DIRTY_TIERS}[tier] for tier in tiers]))
     beginning = _apportioned(first, everywhere)
     blocks = (np.repeat(tiers, counts) for counts in (beginning, everywhere - beginning))
     return tuple(str(tier) for block in blocks for tier in rng.permutation(block))

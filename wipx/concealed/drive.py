@@ -10,10 +10,11 @@ from wipx.concealed.compiled import equation
 
 @equation
 def static_part(command, t, r):
-    """Force asked of the drive: dead zone, gain (perhaps drifting over time), saturation [N or N m]."""
+    """Force asked of the drive: dead zone, gain (which may drift and sag), saturation [N or N m]."""
     if abs(command) <= r.dead_band:
         return 0.0
-    force = (command - math.copysign(r.dead_band, command)) * r.gain * (1.0 + r.gain_drift * t)
+    force = (command - math.copysign(r.dead_band, command)) * r.gain * (1.0 + r.gain_drift * (t - r.drift_middle))
+    force *= 1.0 - r.sag * (abs(force) - r.sag_middle)
     return min(max(force, -r.force_limit), r.force_limit)
 
 
@@ -44,13 +45,15 @@ def motor(joint, y, asked, r):
 def coupled(y, force, r):
     """Force on the cart through a drive with a mass of its own, and the drive's acceleration.
 
-    The drive, at y[16] with speed y[17], meets the cart through play with stiff flanks, or through a contact that
-    creeps and gives way at `traction`.
+    The drive, at y[16] with speed y[17], meets the cart through play with stiff flanks, through a belt, or through a
+    contact that creeps and gives way at `traction`.
     """
     if r.drive_mass == 0.0:
         return force, 0.0
     slide, creep = y[16] - y[0], y[17] - y[3]
-    if r.traction > 0.0:
+    if r.belt_stiffness > 0.0:
+        passed = r.belt_stiffness * slide + r.belt_damping * creep
+    elif r.traction > 0.0:
         passed = r.traction * math.tanh(r.creep * creep / r.traction)
     else:
         depth = abs(slide) - 0.5 * r.gap

@@ -2,7 +2,8 @@
 
 State y: coordinates q0, q1 and the moving mass's (0-2), their rates (3-5), lag (6, 7), bristles (8, 9), elements of
 the hysteresis (10-12, 13-15), the free drive's place and speed (16, 17). Mode of a joint: 0 sticks, +1 or -1 the
-direction in which it slips.
+direction in which it slips. Inputs: forces asked of the drives (0, 1), and waves, which the robot's record scales:
+forces from outside (2, 3), wandering of the friction (4, 5).
 """
 
 import math
@@ -15,30 +16,31 @@ from wipx.concealed.friction import bristle, hysteresis, slipping_force, static_
 from wipx.concealed.motion import accelerate, cart_and_body, sliding_mass, smooth_forces, two_links
 
 STATES = 18
+INPUTS = 6
 STEP = 1e-4  # [s]
 SMALLEST_SHARE = 1e-3  # of a step, between two events
 MOST_EVENTS = 12  # in one step; a joint that chatters more is advanced regardless
 
 
 @equation
-def derivative(y, t, asked, mode, r, rates):
+def derivative(y, t, inputs, mode, r, rates):
     """Fill `rates` with dy/dt; returns the holding forces of sticking joints and the drives' forces."""
     if r.chain:
         m00, m01, m11, f0, f1 = two_links(y, r)
     else:
         m00, m01, m11, f0, f1 = cart_and_body(y, t >= r.event_time, r)
-    s0, s1 = smooth_forces(y, r)
-    b0, rates[8] = bristle(0, y, r)
-    b1, rates[9] = bristle(1, y, r)
+    s0, s1 = smooth_forces(y, inputs, r)
+    b0, rates[8] = bristle(0, y, inputs, r)
+    b1, rates[9] = bristle(1, y, inputs, r)
     h0, h1 = hysteresis(0, y, r, rates), hysteresis(1, y, r, rates)
     drive0, drive1, rates[17] = 0.0, 0.0, 0.0
     if r.driven[0]:
-        force, rates[6] = motor(0, y, asked[0], r)
+        force, rates[6] = motor(0, y, inputs[0], r)
         drive0, rates[17] = coupled(y, force, r)
     if r.driven[1]:
-        drive1, rates[7] = motor(1, y, asked[1], r)
-    f0 += s0 + b0 + h0 + drive0 + slipping_force(0, y, mode[0], r)
-    f1 += s1 + b1 + h1 + drive1 + slipping_force(1, y, mode[1], r)
+        drive1, rates[7] = motor(1, y, inputs[1], r)
+    f0 += s0 + b0 + h0 + drive0 + slipping_force(0, y, inputs, mode[0], r)
+    f1 += s1 + b1 + h1 + drive1 + slipping_force(1, y, inputs, mode[1], r)
     hold0, hold1 = joint_rates(y, m00, m01, m11, f0, f1, mode, r, rates)
     rates[16] = y[17]
     return hold0, hold1, drive0, drive1
@@ -62,12 +64,12 @@ def joint_rates(y, m00, m01, m11, f0, f1, mode, r, rates):
 
 
 @equation
-def release(y, t, asked, mode, r, rates):
+def release(y, t, inputs, mode, r, rates):
     """Let go the sticking joints whose holding force exceeds the static level, the more overloaded one first."""
     for _ in range(2):
-        hold0, hold1, _d0, _d1 = derivative(y, t, asked, mode, r, rates)
-        excess0 = overload(0, y, hold0, mode, r)
-        excess1 = overload(1, y, hold1, mode, r)
+        hold0, hold1, _d0, _d1 = derivative(y, t, inputs, mode, r, rates)
+        excess0 = overload(0, y, inputs, hold0, mode, r)
+        excess1 = overload(1, y, inputs, hold1, mode, r)
         if excess0 <= 0.0 and excess1 <= 0.0:
             return
         if excess0 >= excess1:
@@ -77,28 +79,28 @@ def release(y, t, asked, mode, r, rates):
 
 
 @equation
-def overload(joint, y, hold, mode, r):
+def overload(joint, y, inputs, hold, mode, r):
     """By how much the holding force of a sticking joint exceeds its static level; -1 if it does not stick."""
     if mode[joint] != 0 or not r.dry[joint] or r.locked[joint]:
         return -1.0
     direction = -1 if hold > 0.0 else 1
-    return abs(hold) - static_level(joint, y[0], direction, r)
+    return abs(hold) - static_level(joint, y, inputs, direction, r)
 
 
 @equation
-def runge_kutta(y, t, step, asked, mode, r, work):
+def runge_kutta(y, t, step, inputs, mode, r, work):
     """Advance y by one step in a fixed mode into work[5]; returns the drives' mean forces."""
     k1, k2, k3, k4, mid, new = work[0], work[1], work[2], work[3], work[4], work[5]
-    _a, _b, p0, p1 = derivative(y, t, asked, mode, r, k1)
+    _a, _b, p0, p1 = derivative(y, t, inputs, mode, r, k1)
     for i in range(STATES):
         mid[i] = y[i] + 0.5 * step * k1[i]
-    _a, _b, q0, q1 = derivative(mid, t + 0.5 * step, asked, mode, r, k2)
+    _a, _b, q0, q1 = derivative(mid, t + 0.5 * step, inputs, mode, r, k2)
     for i in range(STATES):
         mid[i] = y[i] + 0.5 * step * k2[i]
-    _a, _b, s0, s1 = derivative(mid, t + 0.5 * step, asked, mode, r, k3)
+    _a, _b, s0, s1 = derivative(mid, t + 0.5 * step, inputs, mode, r, k3)
     for i in range(STATES):
         mid[i] = y[i] + step * k3[i]
-    _a, _b, e0, e1 = derivative(mid, t + step, asked, mode, r, k4)
+    _a, _b, e0, e1 = derivative(mid, t + step, inputs, mode, r, k4)
     for i in range(STATES):
         new[i] = y[i] + step / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     return (p0 + 2.0 * q0 + 2.0 * s0 + e0) / 6.0, (p1 + 2.0 * q1 + 2.0 * s1 + e1) / 6.0
@@ -118,18 +120,18 @@ def share_to_stop(y, new, mode, r):
 
 
 @equation
-def advance(y, t, step, asked, mode, r, work, impulse):
+def advance(y, t, step, inputs, mode, r, work, impulse):
     """Advance y over a step, event by event; `impulse` gathers the drives' forces times time."""
     done = 0.0
     for event in range(MOST_EVENTS):
         if (r.dry[0] and mode[0] == 0) or (r.dry[1] and mode[1] == 0):
-            release(y, t + done, asked, mode, r, work[0])
+            release(y, t + done, inputs, mode, r, work[0])
         left = step - done
-        d0, d1 = runge_kutta(y, t + done, left, asked, mode, r, work)
+        d0, d1 = runge_kutta(y, t + done, left, inputs, mode, r, work)
         share, joint = share_to_stop(y, work[5], mode, r)
         if joint >= 0 and event < MOST_EVENTS - 1:
             left *= share
-            d0, d1 = runge_kutta(y, t + done, left, asked, mode, r, work)
+            d0, d1 = runge_kutta(y, t + done, left, inputs, mode, r, work)
         y[:] = work[5]
         impulse[0] += d0 * left
         impulse[1] += d1 * left
@@ -161,8 +163,10 @@ def late(instants, places, speeds, k, when):
 
 @equation
 def read_sensor(j, k, instants, q, v, noise, resolution, r):
-    """What the sensor of joint j shows at instant k: scaled, late, biased, noisy, in steps of its resolution."""
+    """What the sensor of joint j shows at instant k: late, eccentric, scaled, biased, noisy, in steps."""
     true = late(instants, q[:, j], v[:, j], k, instants[k] - r.sensor_delay[j])
+    if r.wobble[j] != 0.0:
+        true += r.wobble[j] * math.sin(r.wobble_number[j] * true + r.wobble_phase[j])
     shown = (1.0 + r.sensor_scale[j]) * true + r.sensor_bias[j] + noise[k, j]
     if resolution[j] > 0.0:
         shown = resolution[j] * math.floor(shown / resolution[j] + 0.5)
@@ -170,10 +174,12 @@ def read_sensor(j, k, instants, q, v, noise, resolution, r):
 
 
 @equation
-def interval(y, k, instants, commands, active, mode, r, work, impulse):
+def interval(y, k, instants, commands, waves, active, mode, r, work, impulse):
     """Advance y from instant k to the next under the delayed commands; returns the command that is now active."""
     t, end = instants[k], instants[k + 1]
-    asked = work[6]
+    inputs = work[6]
+    for i in range(INPUTS - 2):
+        inputs[2 + i] = waves[k, i]
     while t < end - 1e-12:
         while active < k and instants[active + 1] + r.delay <= t + 1e-12:
             active += 1
@@ -184,14 +190,14 @@ def interval(y, k, instants, commands, active, mode, r, work, impulse):
             stop = r.event_time
         for j in range(2):
             command = commands[active, j] if active >= 0 else 0.0
-            asked[j] = static_part(command, t, r)
-        advance(y, t, stop - t, asked, mode, r, work, impulse)
+            inputs[j] = static_part(command, t, r)
+        advance(y, t, stop - t, inputs, mode, r, work, impulse)
         t = stop
     return active
 
 
 @kept
-def simulate(r, start, instants, reference, extra, noise, rate_noise, use_gyro, resolution, gains, cutoff, limit):
+def simulate(r, start, instants, reference, extra, waves, noise, rate_noise, gyro, resolution, gains, cutoff, limit):
     """Drive a robot in closed loop: u = -K (q - q_ref) + extra at every control instant.
 
     Args:
@@ -200,9 +206,10 @@ def simulate(r, start, instants, reference, extra, noise, rate_noise, use_gyro, 
         instants: Control instants, shape (n + 1,) [s].
         reference: Of coordinates and rates, shape (n, 4).
         extra: Added to the commands, shape (n, 2) [N or N m].
+        waves: Of unit variance, held between instants: forces from outside and wandering of friction, shape (n, 4).
         noise: Of the sensors, shape (n, 2).
         rate_noise: Of the rate sensors, shape (n, 2).
-        use_gyro: Whether the controller has a rate sensor, by joint, shape (2,).
+        gyro: Whether the controller has a rate sensor, by joint, shape (2,).
         resolution: Of the sensors, shape (2,); 0 for none.
         gains: K, shape (2, 4).
         cutoff: Of the filter of differenced coordinates [Hz].
@@ -210,11 +217,12 @@ def simulate(r, start, instants, reference, extra, noise, rate_noise, use_gyro, 
 
     Returns:
         Number of instants before it fell (n if it did not), and arrays of shape (n, 2): coordinates as the sensors
-        show them, true coordinates, true rates, commands, and the drives' mean forces until the next instant.
+        show them, true coordinates, true rates, commands, and the drives' mean forces until the next instant; and the
+        whole states, shape (n, STATES).
     """
     n = len(instants) - 1
     q, v, shown, forces = np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
-    commands = extra.copy()
+    commands, states = extra.copy(), np.zeros((n, STATES))
     y, work, impulse = np.zeros(STATES), np.zeros((7, STATES)), np.zeros(2)
     mode, rate = np.zeros(2, np.int64), np.zeros(2)
     y[0], y[1] = start[0], start[1]
@@ -222,16 +230,17 @@ def simulate(r, start, instants, reference, extra, noise, rate_noise, use_gyro, 
     active = -1
     for k in range(n):
         if abs(y[0]) > limit[0] or abs(y[1]) > limit[1] or not math.isfinite(y[0] + y[1]):
-            return k, shown, q, v, commands, forces
+            return k, shown, q, v, commands, forces, states
+        states[k] = y
         q[k], v[k] = y[0:2], y[3:5]
-        if r.traction > 0.0:  # the encoder sits on the wheel, which slips
+        if r.traction > 0.0 or r.belt_motor_side > 0.0:  # the encoder sits on the wheel that slips, or before the belt
             q[k, 0], v[k, 0] = y[16], y[17]
-        feel(k, instants, q, v, shown, rate, noise, rate_noise, use_gyro, resolution, cutoff, r)
+        feel(k, instants, q, v, shown, rate, noise, rate_noise, gyro, resolution, cutoff, r)
         feed_back(k, shown, rate, reference, gains, r, commands)
         impulse[:] = 0.0
-        active = interval(y, k, instants, commands, active, mode, r, work, impulse)
+        active = interval(y, k, instants, commands, waves, active, mode, r, work, impulse)
         forces[k] = impulse / (instants[k + 1] - instants[k])
-    return n, shown, q, v, commands, forces
+    return n, shown, q, v, commands, forces, states
 
 
 @equation

@@ -9,6 +9,8 @@ import math
 from wipx.concealed.compiled import equation
 
 FIRST_ELEMENT, ELEMENTS = 10, 3  # of the hysteresis in the state: place, and number for each joint
+USUAL = 0.8  # mean size of a force that varies like a normal variable, over its root mean square
+LEAST_GRIP = 0.2  # friction that wanders never vanishes
 
 
 @equation
@@ -23,38 +25,56 @@ def place_level(x, r):
 
 
 @equation
-def kinetic_level(joint, x, speed, direction, r):
-    """Size of the friction on a slipping joint [N or N m]: Stribeck's curve (Armstrong-Helouvry 1991)."""
+def grip(joint, y, inputs, direction, r):
+    """Factor by which friction differs from its law: it wanders with time, place and load, and is uneven."""
+    if not r.uneven_friction:
+        return 1.0
+    load = abs(inputs[joint] if r.driven[joint] else inputs[0])
+    place = math.sin(r.wander_number[joint] * y[joint] + r.wander_phase[joint])
+    excess = r.wander[joint] * inputs[4 + joint] + r.wander_place[joint] * place + r.uneven[joint] * direction
+    return max(LEAST_GRIP, 1.0 + excess + r.wander_load[joint] * (load / r.usual_load[joint] - USUAL))
+
+
+@equation
+def kinetic_level(joint, y, inputs, direction, r):
+    """Size of the friction on a slipping joint [N or N m]: Stribeck's curve (Armstrong-Helouvry 1991), of any power."""
+    speed = abs(y[3 + joint])
     level = r.kinetic[joint] + direction * r.one_sided[joint]
     bump = r.static[joint] - r.kinetic[joint]
     if bump > 0.0:
         ratio = speed / r.bump_speed[joint]
-        level += bump * math.exp(-ratio * ratio)
-    return level + place_level(x, r) if joint == 0 else level
+        shape = ratio * ratio if r.bump_power[joint] == 2.0 else ratio ** r.bump_power[joint]
+        level += bump * math.exp(-shape)
+    if joint == 0:
+        level += place_level(y[0], r)
+    return level * grip(joint, y, inputs, direction, r)
 
 
 @equation
-def static_level(joint, x, direction, r):
+def static_level(joint, y, inputs, direction, r):
     """Largest force at which the joint still sticks [N or N m], against a motion in `direction`."""
     level = r.static[joint] + direction * r.one_sided[joint]
-    return level + place_level(x, r) if joint == 0 else level
+    if joint == 0:
+        level += place_level(y[0], r)
+    return level * grip(joint, y, inputs, direction, r)
 
 
 @equation
-def slipping_force(joint, y, mode, r):
+def slipping_force(joint, y, inputs, mode, r):
     """Dry friction on a joint: zero unless it slips, mode +1 or -1 [N or N m]."""
     if mode == 0 or not r.dry[joint]:
         return 0.0
-    return -mode * kinetic_level(joint, y[0], abs(y[3 + joint]), mode, r)
+    return -mode * kinetic_level(joint, y, inputs, mode, r)
 
 
 @equation
-def bristle(joint, y, r):
+def bristle(joint, y, inputs, r):
     """Force of the bristles and the rate of their bending z (Dahl 1968; damping as of Canudas de Wit 1995)."""
     level = r.bristle_level[joint]
     if level == 0.0:
         return 0.0, 0.0
     v, z = y[3 + joint], y[8 + joint]
+    level *= grip(joint, y, inputs, math.copysign(1.0, v), r)
     rate = v - abs(v) * z * r.bristle_stiffness[joint] / level
     return -(r.bristle_stiffness[joint] * z + r.bristle_damping[joint] * rate), rate
 

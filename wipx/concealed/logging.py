@@ -31,6 +31,29 @@ class Run:
     fell: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What happens in a run, at every control instant; arrays of shape (n, 2) by joint.
+
+    Attributes:
+        fell: Whether the robot left its limits; what follows is zero.
+        shown: Coordinates as the sensors show them [m, rad].
+        places: True coordinates where the encoders sit [m, rad].
+        rates: Their true rates [m/s, rad/s].
+        commands: [N, N m].
+        forces: Mean forces of the drives until the next instant [N, N m].
+        states: Whole states, shape (n, engine.STATES).
+    """
+
+    fell: bool
+    shown: np.ndarray
+    places: np.ndarray
+    rates: np.ndarray
+    commands: np.ndarray
+    forces: np.ndarray
+    states: np.ndarray
+
+
 def record(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSettings) -> Run:
     """Drive a robot through a scenario and log it.
 
@@ -40,14 +63,20 @@ def record(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSet
         scenario: The run.
         settings: Of the log.
     """
+    return logged(robot, drive(robot, truth, scenario, settings), scenario, settings)
+
+
+def drive(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSettings) -> Course:
+    """Drive a robot through a scenario."""
     limit = np.array(LIMITS.get(robot.kind, (2.0, 0.5)))
     gyro, resolution = np.array(robot.gyro), np.array(settings.resolution)
-    reached, shown, _q, rates, commands, forces = simulate(
+    reached, *arrays = simulate(
         truth[0],
         scenario.start,
         scenario.instants,
         scenario.reference,
         scenario.extra,
+        scenario.waves,
         scenario.noise,
         scenario.rate_noise,
         gyro,
@@ -56,9 +85,15 @@ def record(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSet
         robot.cutoff,
         limit,
     )
-    if reached < len(scenario.instants) - 1:
+    return Course(reached < len(scenario.instants) - 1, *arrays)
+
+
+def logged(robot: Robot, course: Course, scenario: Scenario, settings: LogSettings) -> Run:
+    """What the log keeps of a course."""
+    if course.fell:
         return Run({}, {}, {}, fell=True)
     plant, rows = PLANTS[robot.kind], scenario.rows
+    shown, rates, commands = course.shown, course.rates, course.commands
     columns = {"t": scenario.instants[rows]}
     exact, moving = {}, {}
     for joint, name in zip(MOVING[robot.kind], plant.coordinates, strict=True):
@@ -72,7 +107,7 @@ def record(robot: Robot, truth: np.ndarray, scenario: Scenario, settings: LogSet
     for joint, name in zip(DRIVEN[robot.kind], plant.commands, strict=True):
         columns[name] = _rounded(_means(commands[:, joint], scenario))
         if settings.force_noise is not None:
-            mean = _means(forces[:, joint], scenario)
+            mean = _means(course.forces[:, joint], scenario)
             columns[f"{name}_measured"] = _rounded(mean + np.std(commands[:, joint]) * scenario.force_noise)
     return Run(columns, exact, moving, fell=False)
 

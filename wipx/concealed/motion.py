@@ -7,6 +7,7 @@ by d(theta) moves it by (-n, p) d(theta). Positive theta moves it to -x. Forces 
 import math
 
 from wipx.concealed.compiled import equation
+from wipx.concealed.friction import grip
 
 
 @equation
@@ -73,11 +74,15 @@ def sliding_mass(y, r):
 
 
 @equation
-def smooth_forces(y, r):
+def smooth_forces(y, inputs, r):
     """Forces that need no memory and do not jump: viscous, drag, spring and what the vocabulary lacks, (f0, f1)."""
     x, theta, v, w = y[0], y[1], y[3], y[4]
-    f0 = -v * (r.viscous[0] + r.drag[0] * abs(v) - r.regeneration[0] + r.regeneration_cubic[0] * v * v)
-    f1 = -w * (r.viscous[1] + r.drag[1] * abs(w) - r.regeneration[1] + r.regeneration_cubic[1] * w * w)
+    viscous0 = r.viscous[0] * grip(0, y, inputs, math.copysign(1.0, v), r)
+    viscous1 = r.viscous[1] * grip(1, y, inputs, math.copysign(1.0, w), r)
+    f0 = -v * (viscous0 + r.drag[0] * abs(v) - r.regeneration[0] + r.regeneration_cubic[0] * v * v)
+    f1 = -w * (viscous1 + r.drag[1] * abs(w) - r.regeneration[1] + r.regeneration_cubic[1] * w * w)
+    f0 += r.push[0] * inputs[2]
+    f1 += r.push[1] * inputs[3]
     f0 -= r.spring * (x - r.spring_rest) + v * (r.viscous_forward[0] if v > 0.0 else r.viscous_backward[0])
     f1 -= w * (r.viscous_forward[1] if w > 0.0 else r.viscous_backward[1])
     if r.cog_torque != 0.0:

@@ -42,6 +42,9 @@ _SCALARS = (
     ("ripple", 0.0), ("ripple_wavenumber", 0.0), ("ripple_phase", 0.0),
     ("drive_mass", 0.0), ("gap", 0.0), ("contact_stiffness", 0.0), ("contact_damping", 0.0), ("grease", 0.0),
     ("traction", 0.0), ("creep", 0.0),
+    # what real drives have besides
+    ("drift_middle", 0.0), ("sag", 0.0), ("sag_middle", 0.0),
+    ("belt_stiffness", 0.0), ("belt_damping", 0.0), ("belt_motor_side", 0.0),
 )  # fmt: skip
 _PAIRS = (
     ("viscous", 0.0), ("drag", 0.0), ("kinetic", 0.0), ("static", 0.0), ("bump_speed", 1.0), ("one_sided", 0.0),
@@ -50,9 +53,14 @@ _PAIRS = (
     ("hysteresis", 0.0), ("hysteresis_length", 1.0), ("hysteresis_first", 1.0),
     ("regeneration", 0.0), ("regeneration_cubic", 0.0),
     ("sensor_bias", 0.0), ("sensor_scale", 0.0), ("sensor_delay", 0.0),
+    # friction that keeps to no law, forces from outside, eccentric encoders
+    ("bump_power", 2.0), ("wander", 0.0), ("wander_place", 0.0), ("wander_number", 0.0), ("wander_phase", 0.0),
+    ("wander_load", 0.0), ("usual_load", 1.0), ("uneven", 0.0), ("push", 0.0),
+    ("wobble", 0.0), ("wobble_number", 0.0), ("wobble_phase", 0.0),
 )  # fmt: skip
 RECORD = np.dtype(
     [("chain", np.int64), ("locked", np.int64, 2), ("dry", np.int64, 2), ("driven", np.int64, 2)]
+    + [("uneven_friction", np.int64)]
     + [(name, np.float64) for name, _ in _SCALARS]
     + [(name, np.float64, 2) for name, _ in _PAIRS]
 )
@@ -81,17 +89,20 @@ class Hidden:
         effects: Values of the effects' parameters [SI] by "site/kind"; names as the contract has them.
         details: What an effect's law leaves to the modeller, as fields of the record, by "site/kind".
         oddity: Physics outside the vocabulary; None without.
+        dirt: Fields of the record in which a robot differs from its laws, see `dirt.Dirt.fields`; by joint where they
+            have an entry for each.
     """
 
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     details: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     oddity: Oddity | None = None
+    dirt: Mapping[str, float | Mapping[int, float]] = field(default_factory=dict)
 
     def without(self, name: str) -> "Hidden":
         """The same robot without one effect, or without the oddity of that name."""
         effects = {key: values for key, values in self.effects.items() if key != name}
         oddity = None if self.oddity is not None and self.oddity.name == name else self.oddity
-        return Hidden(effects, self.details, oddity)
+        return Hidden(effects, self.details, oddity, self.dirt)
 
 
 def physics(kind: str, parameters: Mapping[str, float], hidden: Hidden) -> np.ndarray:
@@ -120,6 +131,7 @@ def physics(kind: str, parameters: Mapping[str, float], hidden: Hidden) -> np.nd
             record[entry][0, JOINT[site]] = value
     if hidden.oddity is not None:
         _set_oddity(record, hidden.oddity)
+    _set_dirt(record, hidden.dirt)
     if "actuator/ripple" in hidden.effects:
         record["ripple_wavenumber"] /= parameters.get("wheel_radius", 1.0)
     _set_drive_details(record, hidden)
@@ -254,6 +266,17 @@ def _set_oddity(record: np.ndarray, oddity: Oddity) -> None:
     mass, height = float(record["aux_mass"][0]), float(record["aux_height"][0])
     if mass > 0.0:  # at rest on the body the moving mass is part of what the owner weighed
         record["body_mass"], record["body_height"], record["body_inertia"] = add_mass(_body(record), -mass, height)
+
+
+def _set_dirt(record: np.ndarray, dirt: Mapping[str, float | Mapping[int, float]]) -> None:
+    for name, value in dirt.items():
+        if isinstance(value, Mapping):
+            for joint, size in value.items():
+                record[name][0, joint] = size
+        else:
+            record[name] = value
+    uneven = ("wander", "wander_place", "wander_load", "uneven")
+    record["uneven_friction"] = any(np.any(record[name] != 0.0) for name in uneven)
 
 
 # The free side of a drive with play; contact is stiff enough to be over within 5 ms and hardly rebounds.

@@ -7,7 +7,7 @@ from math import log, pi
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from wipx.concealed.engine import STATES, derivative
+from wipx.concealed.engine import INPUTS, STATES, derivative
 from wipx.concealed.physics import DRIVEN, MOVING, Hidden, physics
 
 FINE = 1e-6  # step of the differences that linearise; rounding and curvature are both below 1e-9
@@ -136,12 +136,12 @@ def linearised(kind: str, parameters: Mapping[str, float]) -> tuple[np.ndarray, 
     def slope(entry: int | None, joint: int | None) -> np.ndarray:
         sides = []
         for sign in (1.0, -1.0):
-            y, asked, rates = np.zeros(STATES), np.zeros(2), np.zeros(STATES)
+            y, inputs, rates = np.zeros(STATES), np.zeros(INPUTS), np.zeros(STATES)
             if entry is not None:
                 y[entry] = sign * FINE
             if joint is not None:
-                asked[joint] = sign * FINE
-            derivative(y, 0.0, asked, np.zeros(2, np.int64), record, rates)
+                inputs[joint] = sign * FINE
+            derivative(y, 0.0, inputs, np.zeros(2, np.int64), record, rates)
             sides.append(rates[entries])
         return (sides[0] - sides[1]) / (2.0 * FINE)
 

@@ -61,6 +61,8 @@ class Scenario:
         noise: Of the sensors, shape (n, 2).
         rate_noise: Of the rate sensors, shape (n, 2).
         force_noise: Of the recorded force, relative to the commands, shape (rows,).
+        waves: Of unit variance, by joint: forces from outside and wandering of friction, shape (n, 4); zero where
+            there are none.
     """
 
     excitation: str
@@ -73,6 +75,7 @@ class Scenario:
     noise: np.ndarray
     rate_noise: np.ndarray
     force_noise: np.ndarray
+    waves: np.ndarray
 
     @property
     def duration(self) -> float:
@@ -141,6 +144,7 @@ def draw_scenario(
         noise,
         rng.standard_normal((count, 2)) * settings.rate_noise,
         rng.standard_normal(int(kept.sum())) * (settings.force_noise or 0.0),
+        np.zeros((count, 4)),
     )
 
 

@@ -50,7 +50,8 @@ def robot_file(case: Case) -> dict[str, object]:
         content["uncertainty"] = dict(case.uncertainty)
     if case.known:
         content["effects"] = {name: dict(values) for name, values in case.known.items()}
-    content["controller"] = {"kind": "lqr", "gains": robot.written_gains, "rate": robot.rate}
+    if robot.gains.any():
+        content["controller"] = {"kind": "lqr", "gains": robot.written_gains, "rate": robot.rate}
     return content
 
 
@@ -72,6 +73,7 @@ def truth(case: Case) -> dict[str, object]:
         "times": _times(hidden.effects, case.visible),
         "true_parameters": {name: case.parameters[name] for name in case.uncertainty},
         "noise": case.noise(),
+        "dirt": None if case.dirt is None else dict(case.dirt),
         "contrast": {name: dict(signals) for name, signals in case.contrast.items()},
         "logging": {
             **asdict(case.settings),
