@@ -78,7 +78,7 @@ def test_a_rival_finds_clear_friction_and_predicts_better(name: str, effects: Ef
     assert answer.mismatch
     friction = {"pitch/coulomb", "pitch/stribeck", "pitch/presliding", "pitch/viscous", "pitch/quadratic_drag"}
     assert friction & {found.name for found in answer.found}
-    judge = Judge(SIMULATOR, given.noise, 0.5, 0.3)
+    judge = Judge(SIMULATOR, given.noise, 0.5)
     errors, _ = judge.compare(given.nominal, answer.model, record(effects, rng), held_out=True)
     assert errors.completed["theta"] < 0.5 * errors.nominal["theta"]
 
@@ -104,8 +104,8 @@ def test_a_network_predicts_better_and_names_nothing(fresh_seed: int):
     assert not answer.found
     assert answer.network is not None
     unseen = record(VISCOUS, rng)
-    nominal, _ = Judge(SIMULATOR, given.noise, 0.5, 0.3).compare(given.nominal, given.nominal, unseen, held_out=True)
-    learned = Judge(learned_simulator(answer.network, given.noise), given.noise, 0.5, 0.3)
+    nominal, _ = Judge(SIMULATOR, given.noise, 0.5).compare(given.nominal, given.nominal, unseen, held_out=True)
+    learned = Judge(learned_simulator(answer.network, given.noise), given.noise, 0.5)
     errors, _ = learned.compare(given.nominal, given.nominal, unseen, held_out=True)
     assert errors.completed["theta"] < 0.5 * nominal.nominal["theta"]
 
@@ -156,7 +156,7 @@ def test_without_learned_acceleration_rollouts_are_those_of_the_simulator(fresh_
     rng = np.random.default_rng(fresh_seed)
     (recording,) = record(VISCOUS, rng, count=1)
     judges = (
-        Judge(s, np.array([NOISE]), 0.5, 0.3) for s in (SIMULATOR, learned_simulator(silent(1, 3), np.array([NOISE])))
+        Judge(s, np.array([NOISE]), 0.5) for s in (SIMULATOR, learned_simulator(silent(1, 3), np.array([NOISE])))
     )
     analytic, learned = (judge.predict(pendulum(VISCOUS), (recording,))[0] for judge in judges)
     np.testing.assert_allclose(learned, analytic, atol=0.1 * NOISE)

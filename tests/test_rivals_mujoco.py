@@ -115,7 +115,7 @@ def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: s
     found = {f.name: f for f in answer.found}
     assert max(found, key=lambda n: found[n].weight) == effect
     assert found[effect].parameters[symbol] == pytest.approx(value, rel=0.1)  # small companions may take a share
-    errors, _ = Judge(SIMULATOR, case.noise, 0.5, 0.3).compare(nominal, answer.model, record(true, rng), held_out=True)
+    errors, _ = Judge(SIMULATOR, case.noise, 0.5).compare(nominal, answer.model, record(true, rng), held_out=True)
     column = nominal.plant.coordinates[0]
     assert errors.completed[column] < 0.3 * errors.nominal[column]
 

@@ -139,6 +139,5 @@ def complete(
         objective,
         optimizer,
         horizon=0.5,
-        lead=0.3,
         rng=np.random.default_rng(0),
     )

@@ -153,7 +153,6 @@ FAULTS = {
     "missing column": (drop_column, ["r1.csv", "column theta", "missing"]),
     "reversed command": (reverse_command, ["sign of u", "reverse it"]),
     "wrong unit": (read_degrees, ["unit of theta", "deg"]),
-    "negative lead": (lambda folder: None, ["lead is -1"]),
 }
 
 
@@ -163,8 +162,7 @@ def test_input_at_fault_is_refused_in_one_line(program, tmp_path: Path, fault: s
     folder = own_folder(tmp_path)
     damage(folder)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    lead = ["task.lead=-1"] if fault == "negative lead" else []
-    answer = program("task=diagnose", f"recordings.path={folder}", "hydra.run.dir=out", *lead)
+    answer = program("task=diagnose", f"recordings.path={folder}", "hydra.run.dir=out")
     assert (answer.status, answer.out) == (2, "")
     assert answer.error.count("\n") == 1, answer.error
     for words in said:

@@ -4,7 +4,7 @@ Reading and writing of files is in `wipx.recordings.model_file`; simulation in `
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -25,19 +25,24 @@ class Model:
         parameters: Rigid body by name [SI]; complete.
         effects: Values of each effect's parameters [SI], by "site/kind"; an effect that is not
             listed is absent.
+        bandwidths: How little the model is trusted where a prediction starts: bandwidth of the filter that
+            estimates its state, by coordinate [rad/s]; empty where that is not known. No physics depends on it.
     """
 
     plant: Plant
     parameters: Mapping[str, float]
     effects: Mapping[str, Mapping[str, float]]
+    bandwidths: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", _frozen(self.parameters))
         object.__setattr__(self, "effects", MappingProxyType({k: _frozen(v) for k, v in self.effects.items()}))
+        object.__setattr__(self, "bandwidths", _frozen(self.bandwidths))
 
     def __reduce__(self):
         # Mapping proxies do not pickle; rebuild from plain dictionaries.
-        return _rebuild, (self.plant.kind, dict(self.parameters), {k: dict(v) for k, v in self.effects.items()})
+        effects = {k: dict(v) for k, v in self.effects.items()}
+        return _rebuild, (self.plant.kind, dict(self.parameters), effects, dict(self.bandwidths))
 
     def value(self, name: str) -> float:
         """The number of that name: a plant parameter or "site/kind.symbol"."""
@@ -58,10 +63,12 @@ class Model:
         return replace(self, effects={**self.effects, **effects})
 
 
-def _rebuild(kind: str, parameters: dict[str, float], effects: dict[str, dict[str, float]]) -> Model:
+def _rebuild(
+    kind: str, parameters: dict[str, float], effects: dict[str, dict[str, float]], bandwidths: dict[str, float]
+) -> Model:
     from wipx.core.plant import plant_of
 
-    return Model(plant_of(kind), parameters, effects)
+    return Model(plant_of(kind), parameters, effects, bandwidths)
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,6 @@ def diagnose(
     *,
     title: str = "",
     source: str = "robot.yaml",
-    lead: float = 0.3,
     rng: np.random.Generator | None = None,
     watcher: Watcher = unwatched,
     suspects: Mapping[str, Mapping[str, float]] | None = None,
@@ -78,7 +77,6 @@ def diagnose(
         simulator: The engine.
         title: Of the page.
         source: Where the recordings come from.
-        lead: Time before a prediction from which its state is estimated [s].
         rng: Draws the excitations of the next experiment; None for always the same.
         watcher: Told the stage and the share that is done.
         suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
@@ -93,7 +91,7 @@ def diagnose(
     halves = in_two(recordings)
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    inquiry = Inquiry.of(halves, setting, simulator, lead)
+    inquiry = Inquiry.of(halves, setting, simulator)
     watcher("noise of the nominal model", 0.02)
     fitter = inquiry.fitter
     nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), inquiry.first_levels))

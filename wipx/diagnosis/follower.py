@@ -8,8 +8,9 @@ import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.log import Log
-from wipx.diagnosis.observer import Gains, Linearisation, NoiseLevels, linearise_along, observer_gains
+from wipx.diagnosis.observer import Gains, NoiseLevels, observer_gains
 from wipx.diagnosis.whiteness import LARGEST
+from wipx.identify.linearisation import Linearisation, linearise_along
 from wipx.identify.prediction import true_state
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
@@ -40,7 +41,7 @@ class Follower:
     @classmethod
     def of(cls, simulator: AnalyticSimulator, log: Log, nominal: Model) -> "Follower":
         """A follower of recordings whose gains are those of the nominal body."""
-        return cls(simulator, log, linearise_along(nominal, log))
+        return cls(simulator, log, linearise_along(nominal, log.measured[:, : log.joints]))
 
     def gains(self, levels: NoiseLevels, model: Model) -> Gains:
         """Gains for noise levels and for the sensor delays of a model."""

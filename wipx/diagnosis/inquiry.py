@@ -40,16 +40,16 @@ class Inquiry:
 
     @classmethod
     def of(
-        cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator, lead: float
+        cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator
     ) -> "Inquiry":
-        """The means for recordings of a robot; `lead` is the time before a prediction that its state is taken from."""
+        """The means for recordings of a robot."""
         plant = setting.nominal.plant
         log = Log.of(recordings, plant)
         noise = sensor_noise(recordings, plant)
         rates = [_rate_noise(recordings, plant.rates[c - log.joints]) for c in log.channels if c >= log.joints]
         levels = NoiseLevels(np.full(log.joints, 0.01), np.array([*noise, *rates]))
         fitter = Fitter(Follower.of(simulator, log, setting.nominal))
-        return cls(fitter, setting, levels, Judge(simulator, noise, HORIZON, lead), recordings)
+        return cls(fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
 
     @property
     def log(self) -> Log:

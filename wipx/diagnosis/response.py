@@ -7,8 +7,8 @@ wrongly at the next one is the response (Ljung 1999, System Identification, sec.
 import numpy as np
 
 from wipx.diagnosis.fitting import Fit, Fitter
-from wipx.diagnosis.observer import transition_over
 from wipx.diagnosis.whiteness import whitened_change
+from wipx.identify.linearisation import transition_over
 from wipx.sim.cache import cached
 
 SLOW = 0.02  # of the largest speed, at which half of dry friction has built up

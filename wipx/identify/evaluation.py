@@ -1,6 +1,6 @@
 """Judging a model: prediction errors over windows, and the predictions themselves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,62 +8,150 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
-from wipx.identify.prediction import Predictor
-from wipx.identify.windows import Windows, cut
+from wipx.identify.prediction import DIVERGED
+from wipx.identify.smoothing import BANDWIDTHS, Smoother, Starts, starts_of
+from wipx.identify.windows import LEAD, LOOK_AHEAD, Windows, cut
+from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import Simulator
+
+TRIAL = 0.25  # [s] between the predictions by which filters are compared
+RIGHT = 3.0  # [rad/s] bandwidth of the filter that follows a right model
+LEARNT = 1.5  # [s] of trials before which no filter is preferred to the usual one
+USUAL = 3  # filter from which a prediction starts before any trial, among `BANDWIDTHS`
 
 
 @dataclass(frozen=True)
 class Judge:
     """Predicts recordings window by window, contract section 4.
 
+    Where a prediction starts depends on how far the model is trusted (`Smoother`). Where the model does not say that
+    itself, it is learned as a recording goes on: each prediction starts from the filter whose own predictions have
+    erred least in the rows that it may see.
+
     Attributes:
         simulator: The engine.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
         horizon: Length of a prediction [s].
-        lead: Time before a window's start from which its state is estimated [s].
     """
 
     simulator: Simulator
     noise: np.ndarray
     horizon: float
-    lead: float
 
     def predict(self, model: Model, recordings: tuple[Recording, ...]) -> list[np.ndarray]:
         """Predicted coordinates of each recording, shape (rows, joints); NaN before the first window."""
-        predictor = self._predictor(recordings, model.plant)
-        return _by_recording(predictor.windows, predictor.predict(ModelBatch(model)).coordinates[:, :, 0], recordings)
+        starts = self._starts(model, recordings)
+        return _by_recording(starts.windows, self._predicted(model, starts), recordings)
 
     def compare(
         self, nominal: Model, completed: Model, recordings: tuple[Recording, ...], *, held_out: bool
     ) -> tuple[FitErrors, tuple[Trace, ...]]:
         """Errors of two models on the same windows, and what they predicted."""
         plant = nominal.plant
-        predictor = self._predictor(recordings, plant)
-        windows = predictor.windows
-        before = predictor.predict(ModelBatch(nominal))
-        after = predictor.predict(ModelBatch(completed), floor=True)
-        assert after.floor is not None
+        starts = self._starts(completed, recordings)
+        windows = starts.windows
+        before = self._predicted(nominal, self._starts(nominal, recordings))
+        after = self._predicted(completed, starts)
+        floor = self._floor(completed, starts, recordings)
         names = plant.coordinates
         errors = FitErrors(
             self.horizon,
             windows.count,
-            dict(zip(names, _rms(windows, before.coordinates[:, :, 0] - windows.recorded), strict=True)),
-            dict(zip(names, _rms(windows, after.coordinates[:, :, 0] - windows.recorded), strict=True)),
-            dict(zip(names, _typical(windows, after.floor[:, :, 0]), strict=True)),
+            dict(zip(names, _rms(windows, before - windows.recorded), strict=True)),
+            dict(zip(names, _rms(windows, after - windows.recorded), strict=True)),
+            dict(zip(names, _typical(windows, floor), strict=True)),
         )
-        predicted = [
-            _by_recording(windows, prediction.coordinates[:, :, 0], recordings) for prediction in (before, after)
-        ]
+        predicted = [_by_recording(windows, prediction, recordings) for prediction in (before, after)]
         traces = [
             self._trace(plant, recordings[i], windows, i, predicted[0][i], predicted[1][i], held_out=held_out)
             for i in range(len(recordings))
         ]
         return errors, tuple(traces)
 
-    def _predictor(self, recordings: tuple[Recording, ...], plant: Plant) -> Predictor:
-        windows = cut(recordings, plant, horizon=self.horizon, lead=self.lead)
-        return Predictor(self.simulator, windows, self.noise)
+    def tuned(self, model: Model, recordings: tuple[Recording, ...]) -> Model:
+        """A model with the bandwidths of the filter from whose states it predicts recordings best."""
+        joints = len(self.noise)
+        best = self._best_of(model, recordings, [np.full(joints, bandwidth) for bandwidth in BANDWIDTHS])
+        for j in range(joints if joints > 1 else 0):
+            others = [np.where(np.arange(joints) == j, bandwidth, best) for bandwidth in BANDWIDTHS]
+            best = self._best_of(model, recordings, others)
+        return replace(model, bandwidths=dict(zip(model.plant.coordinates, best.tolist(), strict=True)))
+
+    def _best_of(self, model: Model, recordings: tuple[Recording, ...], bandwidths: list[np.ndarray]) -> np.ndarray:
+        """The bandwidths of the least squared error."""
+        windows = cut(recordings, model.plant, horizon=self.horizon, lead=LEAD)
+        starts = starts_of(self._smoother(model, recordings), windows, model, bandwidths)
+        errors = self._squares(self._replayed(model, starts, len(bandwidths)), windows)
+        return bandwidths[int(np.argmin(errors[windows.predicted].sum(axis=0)))]
+
+    def _smoother(self, model: Model, recordings: tuple[Recording, ...]) -> Smoother:
+        return Smoother(AnalyticSimulator(self.simulator.step), model.plant, recordings, self.noise)
+
+    def _starts(self, model: Model, recordings: tuple[Recording, ...]) -> Starts:
+        """Windows of the recordings, each with the states of the filter that it starts from."""
+        smoother = self._smoother(model, recordings)
+        windows = cut(recordings, model.plant, horizon=self.horizon, lead=LEAD)
+        if model.bandwidths:
+            known = np.array([model.bandwidths[name] for name in model.plant.coordinates])
+            return starts_of(smoother, windows, model, [known])
+        bandwidths = [np.full(len(self.noise), bandwidth) for bandwidth in BANDWIDTHS]
+        trials = cut(recordings, model.plant, horizon=self.horizon, lead=LEAD, stride=TRIAL)
+        tried = starts_of(smoother, trials, model, bandwidths)
+        starts = starts_of(smoother, windows, model, bandwidths)
+        return starts.of(self._choice(model, tried, starts, len(bandwidths)))
+
+    def _choice(self, model: Model, tried: Starts, starts: Starts, count: int) -> np.ndarray:
+        """Filter from which each window starts: that of the least error in the rows of trials that it may see."""
+        errors = self._squares(self._replayed(model, tried, count), tried.windows)
+        t, recording = tried.windows.inputs.t, tried.windows.recording
+        chosen = np.full(len(starts.until), USUAL)
+        for r, start in enumerate(starts.windows.starts):
+            here = recording == starts.windows.recording[r]
+            seen = (t <= start + LOOK_AHEAD) & here & tried.windows.predicted
+            if start > tried.windows.starts[here].min() + LEARNT:
+                chosen[r] = int(np.argmin(errors[seen].sum(axis=0)))
+        return chosen
+
+    def _squares(self, shown: np.ndarray, windows: Windows) -> np.ndarray:
+        """Squared errors by the spread of each signal, the joints added, shape (K + 1, R, P)."""
+        errors = shown - windows.recorded[:, :, None]
+        sizes = np.ptp(np.moveaxis(windows.recorded, 1, 0)[:, windows.predicted], axis=1) + 1e-12
+        scaled = np.nan_to_num(errors / sizes[:, None, None], nan=1.0, posinf=1.0, neginf=-1.0)
+        return np.moveaxis(np.sum(np.clip(scaled, -1.0, 1.0) ** 2, axis=1), 1, 2)
+
+    def _predicted(self, model: Model, starts: Starts) -> np.ndarray:
+        """Predicted coordinates, shape (K + 1, joints, R); what fell over is held within bounds."""
+        shown = self._replayed(model, starts, 1)[:, :, 0]
+        recorded = starts.windows.recorded
+        rows = np.moveaxis(recorded, 1, 0)[:, starts.windows.predicted]
+        largest = (DIVERGED * np.ptp(rows, axis=1) + 1e3 * self.noise)[:, None]
+        return recorded + np.clip(np.nan_to_num(shown - recorded, nan=np.inf), -largest, largest)
+
+    def _replayed(self, model: Model, starts: Starts, count: int) -> np.ndarray:
+        """Coordinates that a model shows from `count` starts of each window, shape (K + 1, joints, count, R)."""
+        batch = ModelBatch(model, (), np.zeros((count, 0)))
+        path = starts.path(batch)
+        return self.simulator.replay(batch, starts.windows.inputs, path.states[0], path).coordinates
+
+    def _floor(self, model: Model, starts: Starts, recordings: tuple[Recording, ...]) -> np.ndarray:
+        """Deviation that sensor noise alone gives a right model's predictions, shape (K + 1, joints, R).
+
+        A right model is followed by a slow filter, whose memory is a third of a second.
+        """
+        smoother = self._smoother(model, recordings)
+        windows = starts.windows
+        rows = windows.row + starts.until
+        bandwidth = np.full(len(self.noise), RIGHT)
+        covariance = smoother.spread(model, bandwidth, rows, windows.recording)
+        factors = np.linalg.cholesky(covariance + 1e-18 * np.eye(covariance.shape[1]))
+        base = self._replayed(model, starts, 1)
+        variance = np.zeros_like(base[:, :, 0]) + (self.noise**2)[:, None]
+        for i in range(factors.shape[2]):
+            states = starts.states.copy()
+            states[starts.until, :, 0, np.arange(windows.count)] += factors[:, :, i]
+            moved = self._replayed(model, replace(starts, states=states), 1)
+            variance += (moved - base)[:, :, 0] ** 2
+        return np.sqrt(variance)
 
     def _trace(
         self,

@@ -76,7 +76,6 @@ def identify(
     optimizer: Optimizer,
     *,
     horizon: float,
-    lead: float,
     rng: np.random.Generator,
     watcher: Watcher = unwatched,
 ) -> Identified:
@@ -89,7 +88,6 @@ def identify(
         objective: What agreement means.
         optimizer: How to search.
         horizon: Length of the predictions by which the models are judged [s].
-        lead: Time before a prediction from which its state is estimated [s].
         rng: Source of random starts.
         watcher: Sees the progress.
 
@@ -115,7 +113,8 @@ def identify(
     cube = np.where(unwanted, problem.space.neutral, minimum.cube)
     values = problem.space.to_values(cube)
     completed = space.model.with_values(dict(zip(space.names, values.tolist(), strict=True)))
-    judge = Judge(simulator, noise, horizon, lead)
+    judge = Judge(simulator, noise, horizon)
+    nominal, completed = judge.tuned(nominal, split.fit), judge.tuned(completed, split.fit)
     fit, fit_traces = judge.compare(nominal, completed, split.fit, held_out=False)
     unseen, traces = judge.compare(nominal, completed, split.held_out, held_out=True) if split.held_out else (None, ())
     ends = intervals(problem, cube)

@@ -4,6 +4,7 @@ A window of the contract begins at s; the state there is estimated from the rows
 lead before s and 0.05 s after it, and the recorded command is then replayed for one horizon.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from wipx.sim.inputs import Inputs
 
 FIRST_START = 0.5  # [s] after the first row, contract section 4
 LOOK_AHEAD = 0.05  # [s] of rows after the start that the state estimate may use, likewise
+LEAD = 0.2  # [s] of smoothed states before the start, along which friction, lags and gaps settle
 HISTORY = 0.25  # [s] of commands before the lead, for transport delays
 
 
@@ -74,8 +76,9 @@ def cut(
     horizon: float,
     lead: float,
     shooting: bool = False,
+    stride: float | None = None,
 ) -> Windows:
-    """Cut recordings into windows of one `horizon` that follow each other.
+    """Cut recordings into windows of one `horizon`.
 
     Args:
         recordings: What to cut.
@@ -84,13 +87,17 @@ def cut(
         lead: Time before a window's start from which its state is estimated [s].
         shooting: Whether windows have no lead and begin with the recording: the state is then
             estimated from the whole window.
+        stride: Time from one window's start to the next [s]; the first starts as long after the first row. None for
+            windows that follow each other.
 
     Raises:
         InputError: a recording is shorter than one window.
     """
     check_long_enough(recordings)
     pieces = [
-        piece for i, recording in enumerate(recordings) for piece in _pieces(i, recording, horizon, lead, shooting)
+        piece
+        for i, recording in enumerate(recordings)
+        for piece in _pieces(i, recording, horizon, lead, shooting, stride)
     ]
     if not pieces:
         names = ", ".join(r.name for r in recordings)
@@ -130,11 +137,14 @@ class _Piece:
     start: float
 
 
-def _pieces(index: int, recording: Recording, horizon: float, lead: float, shooting: bool):
+def _pieces(
+    index: int, recording: Recording, horizon: float, lead: float, shooting: bool, stride: float | None
+) -> Iterator[_Piece]:
     t = recording.t
-    begin = t[0] if shooting else t[0] + FIRST_START
-    for number in range(int(np.ceil((t[-1] - begin) / horizon))):
-        start = begin + number * horizon
+    begin = t[0] if shooting else t[0] + (stride or FIRST_START)
+    step = stride or horizon
+    for number in range(int(np.ceil((t[-1] - begin) / step))):
+        start = begin + number * step
         first = np.searchsorted(t, start - (0.0 if shooting else lead) - 1e-6)
         last = np.searchsorted(t, start + horizon - 1e-6)
         history = np.searchsorted(t, t[first] - HISTORY - 1e-6)

@@ -4,6 +4,7 @@
     plant: wip
     parameters: {body_mass: 2.6, ...}                 # SI
     effects: {translation/coulomb: {F_c: 3.1}}        # SI
+    bandwidths: {x: 3.0, theta: 10.0}                 # rad/s, optional: of the filter from which predictions start
 
 A robot.yaml is a model file too: what it says besides plant, parameters and effects is left
 to `wipx.recordings.robot_file`.
@@ -19,12 +20,12 @@ import yaml
 from wipx.core.effect import Effect
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.model import Model
-from wipx.core.plant import PLANTS, plant_of
+from wipx.core.plant import PLANTS, Plant, plant_of
 from wipx.effects.catalogue import check_together, effect_of
 from wipx.recordings.strict_yaml import finite_number, load_mapping
 
 SCHEMA = 1
-MODEL_KEYS = ("plant", "parameters", "effects")
+MODEL_KEYS = ("plant", "parameters", "effects", "bandwidths")
 ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads")
 
 
@@ -39,6 +40,8 @@ def write_model(model: Model, path: Path) -> None:
         "parameters": _plain(model.parameters),
         "effects": {name: _plain(values) for name, values in model.effects.items()},
     }
+    if model.bandwidths:
+        content["bandwidths"] = _plain(model.bandwidths)
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         partial.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
@@ -81,7 +84,20 @@ def model_from_mapping(data: Mapping[str, object], where: str) -> Model:
     listed = mapping_of(data, "effects", where)
     check_together(tuple(listed), plant, f"{where}: effects")
     effects = {name: _effect_values(listed[name], name, effect_of(name, plant), where) for name in listed}
-    return Model(plant, parameters, effects)
+    return Model(plant, parameters, effects, _bandwidths(data, plant, where))
+
+
+def _bandwidths(data: Mapping[str, object], plant: Plant, where: str) -> dict[str, float]:
+    """Bandwidth of each coordinate's filter [rad/s]; none where the file has none."""
+    given = mapping_of(data, "bandwidths", where)
+    for name in given:
+        if name not in plant.coordinates:
+            raise unknown_name("coordinate", name, plant.coordinates, f"{where}: bandwidths")
+    found = {name: _number(given, name, f"{where}: bandwidths") for name in given}
+    for name in plant.coordinates if given else ():
+        if found.get(name, 0.0) <= 0.0:
+            raise InputError(f"{where}: bandwidths: {name} is {found.get(name)}, expected a positive number in rad/s")
+    return found
 
 
 def mapping_of(data: Mapping[str, object], key: str, where: str) -> Mapping[str, Any]:

@@ -14,7 +14,7 @@ from wipx.rivals.rigid_body import RigidBody
 from wipx.rivals.torque import actuated, joint_forces
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
-from wipx.sim.simulator import Rollouts
+from wipx.sim.simulator import Path, Rollouts
 
 FASTEST = 1e3  # [m/s, rad/s]; rates are held below it, so that a rollout that falls over stays a number
 
@@ -31,7 +31,7 @@ class LearnedSimulator(AnalyticSimulator):
     network: ResidualAcceleration | None = None
     rest_speeds: tuple[float, ...] = field(default=())
 
-    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, path: Path | None = None) -> Rollouts:
         """As the analytic simulator, one step for each row, the learned acceleration held over it."""
         joints = len(batch.model.plant.joints)
         body = RigidBody(batch.model)
@@ -40,6 +40,8 @@ class LearnedSimulator(AnalyticSimulator):
         coordinates, rates = np.empty(shape), np.empty(shape)
         windows = np.arange(inputs.windows)
         for k in range(len(inputs.t)):
+            if path is not None and k < len(path.states):
+                state = np.where(k <= path.until, path.states[k], state)
             coordinates[k], rates[k] = state[:joints], state[joints:]
             if k == len(inputs.t) - 1:
                 break

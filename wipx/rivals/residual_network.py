@@ -101,7 +101,7 @@ class ResidualNetwork:
 
 def _predicts_better(case: Case, network: ResidualAcceleration) -> bool:
     """Whether 0.5 s predictions of the last recording gain; a good acceleration can still fall over in a rollout."""
-    judge = Judge(case.simulator, case.noise, 0.5, 0.3)
+    judge = Judge(case.simulator, case.noise, 0.5)
     learned = replace(judge, simulator=learned_simulator(network, case.noise))
     before, after = (
         j.compare(case.nominal, case.nominal, case.recordings[-1:], held_out=True)[0].completed

@@ -20,10 +20,11 @@ from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
 from wipx.sim.layout import HELD, NO_ROWS, OPEN, Layout
 from wipx.sim.rows import TOGETHER
-from wipx.sim.simulator import Rollouts, StateFeedback
+from wipx.sim.simulator import Path, Rollouts, StateFeedback
 
 LEAST_WORK_PER_THREAD = 75_000  # lane steps, about 1 ms: less is not worth a thread
 NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
+NO_DRIFT = np.zeros((1, 1, 1, 2, 4))
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ class Observer:
         spread: Half width by which single commands scatter about the mean that the log has, shape (P, inputs)
             [N or N m]; thresholds of the actuator answer to single commands.
         reports: Whether to tell the forces of the drives.
+        drift: Gains of an acceleration on each joint that the observer adds to the model's,
+            shape (groups, K + 1, R, joints, 2 joints); None for none.
     """
 
     recorded: np.ndarray
@@ -45,6 +48,7 @@ class Observer:
     group: np.ndarray
     spread: np.ndarray
     reports: bool = False
+    drift: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ class AnalyticSimulator:
         """The same engine with dry friction that builds up over these `speeds` of the joints [m/s, rad/s]."""
         return replace(self, smoothing=speeds)
 
-    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, path: Path | None = None) -> Rollouts:
         """Open loop: the recorded commands act on every model.
 
         Args:
@@ -77,9 +81,10 @@ class AnalyticSimulator:
             inputs: R windows.
             initial: True coordinates, then rates, at each window's first integrated row,
                 shape (2 joints, P, R) [m, rad, m/s, rad/s].
+            path: Where the rollouts are led at first; None where they are left to themselves from the start.
         """
         run = _Run(self, batch, inputs)
-        run.advance(run.layout.states(initial), 0, run.layout.rows)
+        run.advance(run.layout.states(initial), 0, run.layout.rows, path=path)
         return run.rollouts(inputs.commands[:, :, None, :])
 
     def follow(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, observer: Observer) -> Rollouts:
@@ -167,7 +172,7 @@ class _Run:
         self.coefficients.present[R.ON_REPORT] = True
         self.delivered = np.zeros((self.layout.rows, 2, self.layout.lanes))
 
-    def advance(self, states, first_row, last_row, commands=None, loop=OPEN, observer=None) -> None:
+    def advance(self, states, first_row, last_row, commands=None, loop=OPEN, observer=None, path=None) -> None:
         """Simulate rows; `commands` (K, 2, lanes) are per lane, otherwise the inputs' own are replayed."""
         per_lane = commands is not None
         ramps = HELD
@@ -175,7 +180,8 @@ class _Run:
             commands = self.layout.recorded()
             ramps = self.layout.ramps()
             self.coefficients.present[R.ON_RAMP] = ramps is not HELD
-        measured, corrections, group = self._observed(observer)
+        measured, corrections, drift, group = self._observed(observer)
+        led, until = self.layout.led(path)
         spread = np.zeros((2, self.batch.size))
         if observer is not None:
             spread[self.layout.driven] = observer.spread.T
@@ -201,7 +207,10 @@ class _Run:
                 observer is not None,
                 measured,
                 corrections,
+                drift,
                 group,
+                led,
+                until,
                 self.past,
                 self.out,
                 self.delivered,
@@ -218,18 +227,21 @@ class _Run:
         with ThreadPoolExecutor(len(bounds) - 1) as pool:
             list(pool.map(work, bounds[:-1], bounds[1:]))
 
-    def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Recorded signals, gains and groups in the kernel's layout."""
+    def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Recorded signals, both kinds of gains and groups in the kernel's layout."""
         if observer is None:
-            return NO_ROWS, NO_OBSERVER, np.zeros(1, dtype=np.int64)
+            return NO_ROWS, NO_OBSERVER, NO_DRIFT, np.zeros(1, dtype=np.int64)
         pattern = self.layout.pattern
         measured = np.zeros((self.layout.rows + 1, 4, self.inputs.windows))
         measured[:, pattern] = observer.recorded
-        if len(pattern) == 4:
-            return measured, observer.gains, observer.group.astype(np.int64)
-        gains = np.zeros((*observer.gains.shape[:3], 4, 4))
-        gains[..., np.array(pattern)[:, None], pattern] = observer.gains
-        return measured, gains, observer.group.astype(np.int64)
+        gains, drift = observer.gains, NO_DRIFT
+        if len(pattern) < 4:
+            gains = np.zeros((*observer.gains.shape[:3], 4, 4))
+            gains[..., np.array(pattern)[:, None], pattern] = observer.gains
+        if observer.drift is not None:
+            drift = np.zeros((*observer.drift.shape[:3], 2, 4))
+            drift[..., np.array(pattern[: len(pattern) // 2])[:, None], pattern] = observer.drift
+        return measured, gains, drift, observer.group.astype(np.int64)
 
     def _shares(self, first_row: int, last_row: int) -> list[int]:
         """Lane bounds of the threads, in whole vectors."""

@@ -1,12 +1,13 @@
 """Where compiled kernels are kept between runs.
 
-numba notices a change of the kernel's own file only, not of the laws that it calls; the cache
-folder is therefore named after the sources of all of them. NUMBA_CACHE_DIR moves it.
+numba notices a change of the kernel's own file only, not of what it calls in other modules; the cache folder is
+therefore named after the sources of all modules that have compiled code. NUMBA_CACHE_DIR moves it.
 """
 
 import hashlib
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,28 @@ import numba
 from numba.core import config as numba_settings
 
 PACKAGE = Path(__file__).resolve().parent.parent
+COMPILED = ("wipx.sim.cache import cached", "wipx.core.law import", "wipx.sim import rows")  # marks of such modules
 
 
-def _sources_digest() -> str:
+def sources_digest(package: Path) -> str:
+    """Digest of the sources of all modules of a package that have compiled code, or constants of it."""
     digest = hashlib.sha256()
-    for folder in ("core", "effects", "sim"):
-        for source in sorted((PACKAGE / folder).glob("*.py")):
-            digest.update(source.read_bytes())
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if source.parent.name in ("core", "effects", "sim") or any(mark.encode() in text for mark in COMPILED):
+            digest.update(text)
     return digest.hexdigest()[:16]
 
 
+@cache
 def _cache_folder() -> Path:
+    digest = sources_digest(PACKAGE)
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = home / "wipx" / _sources_digest()
+    folder = home / "wipx" / digest
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
-        return Path(tempfile.gettempdir()) / f"wipx-{_sources_digest()}"
+        return Path(tempfile.gettempdir()) / f"wipx-{digest}"
     return folder
 
 

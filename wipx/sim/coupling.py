@@ -13,14 +13,16 @@ from wipx.sim.body import share_after
 from wipx.sim.cache import cached
 from wipx.sim.kernel import begin_row, replay, respond, set_step, step
 from wipx.sim.rows import W
-from wipx.sim.sensors import feedback, record
+from wipx.sim.sensors import feedback, guide, record
 
 LOST = 1e6  # [m, rad, m/s, rad/s]; beyond it a rollout has fallen over, and the engine is spared it
 
 
 @cached
-def show(S, n, on, past, t_rows, lanes, k, out, lane0, count):
-    """Write what the sensors show at row k."""
+def show(S, n, on, past, t_rows, lanes, k, out, lane0, count, path, until):
+    """Put the state where a path leads, if one does, and write what the sensors show at row k."""
+    if k < len(path):
+        guide(S, lanes, k, lane0, count, path, until)
     record(S, n, on, past, t_rows, lanes, k, out, lane0, count)
 
 

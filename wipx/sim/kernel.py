@@ -21,7 +21,7 @@ from wipx.sim.body import double_body, load_body, payload_event, spring, wip_bod
 from wipx.sim.cache import cached
 from wipx.sim.joints import levels, move, smooth_friction
 from wipx.sim.rows import TOGETHER, W
-from wipx.sim.sensors import correct, feedback, record
+from wipx.sim.sensors import correct, feedback, guide, record
 
 
 @law
@@ -191,7 +191,10 @@ def rollout(
     follows,
     measured,
     observer,
+    drift,
     group,
+    path,
+    until,
     past,
     out,
     delivered,
@@ -222,7 +225,10 @@ def rollout(
         follows: Whether an observer corrects the state at every row.
         measured: What it sees, shape (K + 1, 4, R).
         observer: Its gains, shape (groups, K + 1, R, 4, 4).
+        drift: Its gains of an acceleration on each joint, shape (groups, K + 1, R, 2, 4); else (1, 1, 1, 2, 4).
         group: Which of them each model has, shape (P,).
+        path: True coordinates and rates to which the state is put, shape (rows, 4, lanes), or R for all models.
+        until: Last row at which it is, shape (R,); -1 for never.
         past: True coordinates and rates for sensor delays, shape (K + 1, 4, lanes); else (1, 4, 1).
         out: Coordinates as recorded, then true rates, shape (K + 1, 4, lanes).
         delivered: Mean force of each joint's drive over each row, shape (K, 2, lanes); else (1, 2, 1).
@@ -252,9 +258,13 @@ def rollout(
                 S[(R.N_COEFFICIENTS + i) * W + w] = states[i, lane]
         load_body(S, n)
         for k in range(first_row, last_row):
+            if k < len(path):
+                guide(S, lanes, k, lane0, count, path, until)
             record(S, n, on, past, t_rows, lanes, k, out, lane0, count)
             if follows:
-                correct(S, on, past, t_rows, lanes, k, lane0, count, measured, observer, group)
+                for w in range(count):
+                    counts[w] = substeps[k, lanes[0, w]]
+                correct(S, on, past, t_rows, lanes, k, lane0, count, measured, observer, drift, group, counts)
             if closed:
                 feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:

@@ -12,10 +12,11 @@ from wipx.core.plant import Plant
 from wipx.sim import rows as R
 from wipx.sim.coefficients import joint_index
 from wipx.sim.inputs import Inputs
-from wipx.sim.simulator import Rollouts, StateFeedback
+from wipx.sim.simulator import Path, Rollouts, StateFeedback
 
 NO_ROWS = np.zeros((1, 4, 1))
 HELD = np.zeros((1, 2, 1))
+NOT_LED = np.zeros((0, 4, 1))
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,15 @@ class Layout:
         shape = (len(self.pattern), self.models, self.inputs.windows)
         states[self.pattern] = np.broadcast_to(initial, shape).reshape(len(self.pattern), self.lanes)
         return states
+
+    def led(self, path: Path | None) -> tuple[np.ndarray, np.ndarray]:
+        """A path as the compiled code takes it, shape (rows, 4, lanes), and its last row in each window."""
+        if path is None:
+            return NOT_LED, np.zeros(1, dtype=np.int64)
+        rows, _, models, windows = path.states.shape
+        states = np.zeros((rows, 4, models * windows))
+        states[:, self.pattern] = path.states.reshape(rows, len(self.pattern), -1)
+        return states, path.until.astype(np.int64)
 
     def past(self, present: np.ndarray) -> np.ndarray:
         """Room for the true course (K + 1, 4, lanes) that late sensors need; one number where none is late."""

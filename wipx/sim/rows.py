@@ -44,9 +44,10 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     PLACE, PLACE1, DRIVE_SPEED, DRIVE_SPEED1, PASSED, PASSED1,  # backlash
     MADE, MADE1, LIGHTNESS, LIGHTNESS1,  # accelerations in the last step: by the drive, and by a force of one
     SWING_PLACE, SWING_PLACE1, SWING_RATE, SWING_RATE1,
+    EXTRA, EXTRA1,  # accelerations that an observer adds
     STARTED,  # 0 before the first step, then 1
     N_STATES,
-) = range(N_COEFFICIENTS, N_COEFFICIENTS + 28)  # fmt: skip
+) = range(N_COEFFICIENTS, N_COEFFICIENTS + 30)  # fmt: skip
 
 # Scratch of one step.
 (

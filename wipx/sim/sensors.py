@@ -81,11 +81,13 @@ def feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, no
 
 
 @law
-def correct(S, on, past, t_rows, lanes, k, lane0, count, measured, gains, group):
+def correct(S, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift, group, counts):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
     `measured` has coordinates and rates, shape (K + 1, 4, R); `gains` the shape (groups, K + 1, R, 4 states,
-    4 channels), zero where nothing was measured; `group` says which of them each model has.
+    4 channels), zero where nothing was measured; `group` says which of them each model has. `drift` has the gains of
+    an acceleration that acts on each joint besides, shape (groups, K + 1, R, 2, 4), or (1, 1, 1, 2, 4) without one:
+    what it does until the next row is added at once.
     """
     windows = measured.shape[2]
     for w in range(count):
@@ -102,6 +104,26 @@ def correct(S, on, past, t_rows, lanes, k, lane0, count, measured, gains, group)
             S[(R.V + j) * W + w] += rate
             if on[R.ON_SENSOR_DELAY]:
                 correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, S[(R.SENSOR_DELAY + j) * W + w])
+        if drift.shape[1] > 1 and counts[w] > 0:
+            own = drift[group[(lane0 + w) // windows], k, window]
+            dt = t_rows[k + 1, window] - t_rows[k, window]
+            for j in range(2):
+                S[(R.EXTRA + j) * W + w] += own[j, 0] * e0 + own[j, 1] * e1 + own[j, 2] * e2 + own[j, 3] * e3
+                S[(R.Q + j) * W + w] -= 0.5 * S[(R.EXTRA + j) * W + w] * dt**2  # the rate below drifts on by twice this
+                S[(R.V + j) * W + w] += S[(R.EXTRA + j) * W + w] * dt
+
+
+@law
+def guide(S, lanes, k, lane0, count, path, until):
+    """Put the state where a path leads, at the rows up to `until` (R,) of each window.
+
+    The path has the shape (rows, 4, R) if all models share it, else (rows, 4, P R).
+    """
+    size = path.shape[2]
+    for w in range(count):
+        if k <= until[lanes[0, w]]:
+            for i in range(4):
+                S[(R.Q + i) * W + w] = path[k, i, (lane0 + w) % size]
 
 
 @law

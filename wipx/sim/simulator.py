@@ -48,6 +48,19 @@ class StateFeedback:
     limit: float = np.inf
 
 
+@dataclass(frozen=True)
+class Path:
+    """Where rollouts are led before they are left to themselves, so that friction, lags and delays have settled.
+
+    Attributes:
+        states: True coordinates, then rates, shape (rows, 2 joints, P or 1, R) [m, rad, m/s, rad/s].
+        until: Last row of each window at which its state is put on the path, shape (R,).
+    """
+
+    states: np.ndarray
+    until: np.ndarray
+
+
 class Simulator(Protocol):
     """An engine with the effects of `wipx.effects` around it."""
 
@@ -61,7 +74,7 @@ class Simulator(Protocol):
         """Speed over which the dry friction of each joint builds up [m/s, rad/s]; empty for true sticking."""
         ...
 
-    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, path: Path | None = None) -> Rollouts:
         """Open loop: the recorded commands act on every model.
 
         Args:
@@ -69,6 +82,7 @@ class Simulator(Protocol):
             inputs: R windows.
             initial: True coordinates, then rates, at each window's first integrated row,
                 shape (2 joints, P, R) [m, rad, m/s, rad/s].
+            path: Where the rollouts are led at first; None where they are left to themselves from the start.
 
         Raises:
             InputError: the engine cannot do an effect of the models.

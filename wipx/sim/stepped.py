@@ -22,7 +22,7 @@ from wipx.sim.kernel import filled
 from wipx.sim.layout import HELD, OPEN, ClosedLoop, Layout
 from wipx.sim.mechanism import check_possible
 from wipx.sim.rows import W
-from wipx.sim.simulator import Rollouts, StateFeedback
+from wipx.sim.simulator import Path, Rollouts, StateFeedback
 
 
 class World(Protocol):
@@ -92,10 +92,10 @@ class SteppedSimulator(ABC):
         """The same engine with dry friction that builds up over these `speeds` of the joints [m/s, rad/s]."""
         return replace(self, smoothing=speeds)
 
-    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, path: Path | None = None) -> Rollouts:
         """Open loop: the recorded commands act on every model; see `Simulator.replay`."""
         run = _Run(self, batch, inputs)
-        out = run.advance(initial, run.layout.recorded(), ramps=run.layout.ramps())
+        out = run.advance(initial, run.layout.recorded(), ramps=run.layout.ramps(), path=path)
         return run.layout.rollouts(out, inputs.commands[:, :, None, :])
 
     def close_loop(
@@ -170,6 +170,7 @@ class _Run:
         ramps: np.ndarray = HELD,
         loop: ClosedLoop = OPEN,
         controller: Callable[[float, np.ndarray], np.ndarray] | None = None,
+        path: Path | None = None,
     ) -> np.ndarray:
         """What the sensors show of every lane, shape (K + 1, 4, lanes).
 
@@ -179,7 +180,9 @@ class _Run:
             ramps: Change of the commands along each row, shape (K, 2, R).
             loop: Compiled feedback.
             controller: Of a single lane.
+            path: Where the rollouts are led at first.
         """
+        led = self.layout.led(path)
         states = self.layout.states(initial)
         self.coefficients.present[R.ON_RAMP] = ramps is not HELD
         out = np.empty((self.layout.rows + 1, 4, self.layout.lanes))
@@ -190,7 +193,7 @@ class _Run:
                 for window in range(0, self.inputs.windows, W):
                     block = self._block(p, window, states, own)
                     world.load(model, block.exchange, block.count)
-                    self._advance(block, world, commands, ramps, loop, controller, out)
+                    self._advance(block, world, commands, ramps, loop, controller, out, *led)
         finally:
             world.close()
         return out
@@ -213,7 +216,9 @@ class _Run:
             count,
         )
 
-    def _advance(self, block: _Block, world: World, commands, ramps, loop: ClosedLoop, controller, out) -> None:
+    def _advance(
+        self, block: _Block, world: World, commands, ramps, loop: ClosedLoop, controller, out, led, until
+    ) -> None:
         """Simulate every row of a block."""
         on, t = self.coefficients.present, self.inputs.t
         S, X = block.rows.reshape(-1), block.exchange.values
@@ -222,7 +227,7 @@ class _Run:
         n = filled(count)
         pattern, driven = self.layout.pattern, self.layout.driven
         for k in range(self.layout.rows):
-            show(S, n, on, self.past, t, lanes, k, out, first, count)
+            show(S, n, on, self.past, t, lanes, k, out, first, count, led, until)
             if controller is not None:
                 commands[k, driven, 0] = controller(float(t[k, 0]), out[k, pattern, 0])
             least, most = begin(
@@ -252,4 +257,4 @@ class _Run:
                 between(S, n, X, on)
                 world.advance()
                 after(S, n, X)
-        show(S, n, on, self.past, t, lanes, self.layout.rows, out, first, count)
+        show(S, n, on, self.past, t, lanes, self.layout.rows, out, first, count, led, until)

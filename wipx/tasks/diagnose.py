@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from wipx.core.diagnosis import Diagnosis
-from wipx.core.errors import InputError, check_positive
+from wipx.core.errors import InputError
 from wipx.diagnosis.case import Robot, diagnose
 from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
@@ -24,16 +24,11 @@ class Diagnose:
     """Diagnose the recordings of a source.
 
     Attributes:
-        lead: Time before a prediction from which its state is estimated [s].
         suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
             suspected, by symbol [SI], or with none; None for no questions.
     """
 
-    lead: float = 0.3
     suspects: dict[str, dict[str, float]] | None = None
-
-    def __post_init__(self) -> None:
-        check_positive(lead=self.lead)
 
     def run(self, job: Job) -> None:
         """Read, diagnose, write."""
@@ -58,7 +53,6 @@ class Diagnose:
                 simulator,
                 title=source.name,
                 source=str(source.path) if source.robot is None else "recordings.robot",
-                lead=self.lead,
                 rng=np.random.default_rng(job.seed),
                 watcher=progress,
                 suspects=self.suspects,

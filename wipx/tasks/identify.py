@@ -30,14 +30,12 @@ class Identify:
 
     Attributes:
         horizon: Length of the predictions by which models are judged [s]; contract: 0.5.
-        lead: Time before a prediction from which its state is estimated [s].
     """
 
     horizon: float = 0.5
-    lead: float = 0.3
 
     def __post_init__(self) -> None:
-        check_positive(horizon=self.horizon, lead=self.lead)
+        check_positive(horizon=self.horizon)
 
     def run(self, job: Job) -> None:
         """Read, identify, judge, write."""
@@ -60,7 +58,6 @@ class Identify:
                 objective,
                 optimizer,
                 horizon=self.horizon,
-                lead=self.lead,
                 rng=np.random.default_rng(job.seed),
                 watcher=progress,
             )

@@ -5,7 +5,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from wipx.core.errors import InputError, check_positive
+from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
@@ -25,15 +25,10 @@ class Predict:
     """Predict every recording, restarted every 0.5 s.
 
     Attributes:
-        lead: Time before a restart from which the state is estimated [s].
         residual: A residual.npz whose learned acceleration is added to the model's; None for none.
     """
 
-    lead: float = 0.3
     residual: str | None = None
-
-    def __post_init__(self) -> None:
-        check_positive(lead=self.lead)
 
     def run(self, job: Job) -> None:
         """Write metrics.json and one csv of predicted columns for each recording."""
@@ -76,7 +71,7 @@ class Predict:
         Raises:
             InputError: the recordings are too short, or the learned acceleration is none of this robot.
         """
-        judge = Judge(simulator, sensor_noise(recordings, model.plant), HORIZON, self.lead)
+        judge = Judge(simulator, sensor_noise(recordings, model.plant), HORIZON)
         errors, traces = judge.compare(nominal, model, recordings, held_out=True)
         if self.residual is None:
             return errors, traces

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.effect import Effect
-from wipx.core.errors import check_positive
 from wipx.core.plant import Plant
 from wipx.core.results import FitErrors
 from wipx.effects.catalogue import effect_of
@@ -29,13 +28,8 @@ class RunRival:
     """Ask a rival about the recordings of a source.
 
     Attributes:
-        lead: Time before a prediction from which its state is estimated [s].
     """
 
-    lead: float = 0.3
-
-    def __post_init__(self) -> None:
-        check_positive(lead=self.lead)
 
     def run(self, job: Job) -> None:
         """Write diagnosis.json, model.yaml and, of a rival that learned one, the network."""
@@ -49,7 +43,7 @@ class RunRival:
         begun = time.perf_counter()
         answer = rival.answer(case, np.random.default_rng(job.seed))
         seconds = time.perf_counter() - begun
-        errors = _errors(case, answer, self.lead)
+        errors = _errors(case, answer)
         content = diagnosis(answer, errors, case) | {"source": str(source.path), "seconds": seconds}
         (job.out / NETWORK).unlink(missing_ok=True)  # of an earlier run
         with written_together(job.out) as folder:
@@ -62,13 +56,13 @@ class RunRival:
         print(f"{content['verdict']}: {named}; {seconds:.1f} s; written to {job.out}")
 
 
-def _errors(case: Case, answer: Answer, lead: float) -> FitErrors:
+def _errors(case: Case, answer: Answer) -> FitErrors:
     """Prediction errors on the recordings that were fitted."""
-    judge = Judge(case.simulator, case.noise, HORIZON, lead)
+    judge = Judge(case.simulator, case.noise, HORIZON)
     errors, _ = judge.compare(case.nominal, answer.model, case.recordings, held_out=False)
     if answer.network is None:
         return errors
-    learned = Judge(learned_simulator(answer.network, case.noise), case.noise, HORIZON, lead)
+    learned = Judge(learned_simulator(answer.network, case.noise), case.noise, HORIZON)
     black_box, _ = learned.compare(answer.model, answer.model, case.recordings, held_out=False)
     return FitErrors(errors.horizon, errors.windows, errors.nominal, black_box.completed, black_box.noise_floor)
 
