@@ -42,9 +42,12 @@ SHARE = (0.10, 0.35)  # of the dominant effects' squared error
 SMALLEST = 0.2  # scale of the dirt; the largest is that of `dirt`
 NEAR = 1.15  # ratio to the drawn share from which a scale is good enough
 TRIALS = 6  # of scales
-OWN = 0.15  # least squared error that leaving out one dominant effect makes, of what leaving out all makes
+OWN = 0.07  # least squared error that leaving out one dominant effect makes, of what leaving out all makes
+OVER_DIRT = 0.7  # least such error, of what the dirt makes
 SHOWS = 3.0  # least difference that leaving it out makes in predictions, over the noise
-ATTEMPTS = 20  # robots for one choice of effects, before another choice
+ATTEMPTS = 2  # robots for one choice of effects, before another choice
+DRAWS = 4  # of sizes, until every dominant effect matters
+MEASURED = 3  # runs on which prediction errors are measured
 SINGLE = 0.15  # of sets that are one short run
 OPEN = 0.5  # of robots that stand without a controller, how many run without one
 STANDING = ("linear_axis", "double_pendulum")
@@ -115,9 +118,10 @@ class Errors:
 
 def draw_dirty(rng: np.random.Generator, tier: str, lengths: tuple[float, float] = LENGTHS) -> Case:
     """A case of a tier of `DIRTY_TIERS`; each of its recordings lasts a time between the two `lengths` [s]."""
+    plant = str(rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values())))
+    count = int(rng.integers(1, 4))
     while True:
-        plant = str(rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values())))
-        names = _dominant(plant, int(rng.integers(1, 4)), rng)
+        names = _dominant(plant, count, rng)
         for _ in range(ATTEMPTS):
             case = realise_dirty(tier, plant, names, rng, lengths)
             if case is not None:
@@ -245,12 +249,26 @@ def _machine(
         return None
     runs = tuple(logged(robot, *run, settings) for run in zip(courses, shown, strict=True))
     draw = Draw(robot, consequences(robot, runs), rng, weak=False)
+    machine = _balanced(replace(machine, known=_known(plant, names, draw)), names, draw)
+    if machine is None:
+        return None
+    there = machine.hidden.effects if tier == "dirty" else {}
+    return replace(machine, dirt=draw_dirt({**machine.known, **there}, names, draw))
+
+
+def _balanced(machine: Machine, names: tuple[str, ...], draw: Draw) -> Machine | None:
+    """The machine with sizes of effects of which each matters on a run; None where none are found."""
     effects = {name: draw_values(name, draw) for name in names}
-    hidden = Hidden(effects, {name: draw_details(name, values, draw) for name, values in effects.items()})
-    there = effects if tier == "dirty" else {}
-    known = _known(plant, tuple(names), draw)
-    dirt = draw_dirt({**known, **there}, tuple(names), draw)
-    return replace(machine, known=known, hidden=hidden, dirt=dirt)
+    for _ in range(DRAWS):
+        details = {name: draw_details(name, values, draw) for name, values in effects.items()}
+        machine = replace(machine, hidden=Hidden(effects, details))
+        errors = prediction_errors(replace(machine, shown=machine.shown[-1:]), names, 0.0)
+        if errors is not None and _all_matter(errors):
+            return machine
+        order = names if errors is None else sorted(names, key=lambda name: errors.own[name])
+        again = (order[0], order[-1])
+        effects |= {name: draw_values(name, draw) for name in again}  # the one that matters least, and most
+    return None
 
 
 def _settings(plant: str, every: float, rng: np.random.Generator) -> LogSettings:
@@ -303,6 +321,8 @@ def _scaled(machine: Machine, there: tuple[str, ...], share: float) -> tuple[flo
         errors = prediction_errors(machine, there, scale)
         if errors is None or errors.dominant <= 0.0 or errors.dirt <= 0.0:
             return None
+        if there:
+            share = min(share, min(errors.own.values()) / OVER_DIRT)
         if 1.0 / NEAR < errors.share / share < NEAR and SHARE[0] <= errors.share <= SHARE[1]:
             return scale, errors
         if there and not _all_matter(errors):
@@ -321,7 +341,7 @@ def _all_matter(errors: Errors) -> bool:
 
 
 def prediction_errors(machine: Machine, there: tuple[str, ...], scale: float) -> Errors | None:
-    """Errors of predictions with parts of the physics, on the visible runs; None where the robot falls.
+    """Errors of predictions with parts of the physics, on visible runs; None where the robot falls.
 
     Args:
         machine: The robot.
@@ -330,10 +350,11 @@ def prediction_errors(machine: Machine, there: tuple[str, ...], scale: float) ->
     """
     kind, names = machine.robot.kind, tuple(machine.hidden.effects)
     truth = machine.record(there, scale)
-    courses = machine.courses(truth, machine.shown)
+    measured = machine.shown[-MEASURED:]
+    courses = machine.courses(truth, measured)
     if courses is None:
         return None
-    runs = tuple(zip(courses, machine.shown, strict=True))
+    runs = tuple(zip(courses, measured, strict=True))
     way = np.mean([motion(truth, *run) for run in runs], axis=0)
     joints = list(MOVING[kind])
 
