@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
+.PHONY: help setup demo real consistency concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -29,6 +29,9 @@ demo: $(READY)  ## the whole chain on an emulated testbed, one page (PROFILE=ful
 real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx +experiment=real_recordings task.page=docs/real_recordings.md
 	cp runs/real_recordings/dfki_double/heldout.png docs/images/real_before_after.png
+
+consistency: $(READY)  ## diagnose every public rig from one group of runs after the other (PROFILE=full: the table of docs/real_consistency.md)
+	$(PY) -m wipx +experiment=real_consistency profile=consistency_$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/real_consistency.md)
 
 concealed: $(READY)  ## diagnose 30 fresh robots with concealed physics (PROFILE=full: 300, the table of docs/blind_results.md)
 	$(PY) -m wipx +experiment=concealed profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from wipx.core.diagnosis import FoundEffect, Suspect, SuspectedSize
-from wipx.core.errors import InputError
-from wipx.core.model import Model
-from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
 from wipx.core.results import Estimate
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.real_recordings import Case, only
+from wipx.tasks.published import Published
+from wipx.tasks.real_recordings import only
 from wipx.tasks.real_table import HEAD, Outcome, asked, cells, markdown, score
 
 RESULTS = {
@@ -42,7 +40,9 @@ def test_nothing_found_names_nothing():
 
 
 def test_a_refusal_stays_in_the_table():
-    refused = Outcome("Rig", {"pitch/coulomb": "F_c = 1 N m"}, None, (), "the recordings contradict its sign of u")
+    refused = Outcome(
+        "Rig", Published({"pitch/coulomb": "F_c = 1 N m"}), None, (), "the recordings contradict its sign of u"
+    )
     assert cells(refused)[2] == "no answer: the recordings contradict its sign of u"
     head, rule, row = markdown([refused]).splitlines()
     assert head.count("|") == rule.count("|") == row.count("|") == len(HEAD) + 1
@@ -66,53 +66,6 @@ def test_a_cell_says_what_came_of_the_authors_figure():
     assert asked(unknown) == f"pitch/coulomb: not named, not excluded: 1.3 nats worse; {shown}"
     instead = suspect(named=False, gain=24.0, size=None, in_place_of=("pitch/presliding",))
     assert asked(instead) == f"pitch/coulomb in place of pitch/presliding: gains 24.0 nats of 43.0; {shown}"
-
-
-def test_known_effects_are_asked_about_at_the_authors_figures():
-    known = {"pitch/coulomb": "", "pitch/viscous": "", "actuator/delay": ""}
-    authors = {"effects": {"pitch/coulomb": {"F_c": 0.3}, "pitch/viscous": {"sigma": 0.1}}}
-    case = Case("rig", known, authors=authors, figures={"pitch/viscous": {"sigma": 0.2}})
-    assert case.suspects == {"pitch/coulomb": {"F_c": 0.3}, "pitch/viscous": {"sigma": 0.2}, "actuator/delay": {}}
-
-
-def test_a_figure_of_an_effect_that_is_not_known_is_refused():
-    with pytest.raises(InputError, match=r"figures: unknown effect .* did you mean pitch/coulomb"):
-        Case("rig", {"pitch/coulomb": ""}, figures={"pitch/coulom": {"F_c": 0.3}})
-
-
-def pendulum() -> Model:
-    plant = plant_of("pendulum")
-    parameters = plant.complete({"body_mass": 0.5, "com_height": 0.1, "body_inertia": 0.0}, "test")
-    return Model(plant, parameters, {"pitch/viscous": {"sigma": 0.1}})
-
-
-def test_the_authors_model_changes_and_joins_the_nominal_one():
-    nominal = pendulum()
-    effects = {"pitch/viscous": {"sigma": 0.2}, "pitch/coulomb": {"F_c": 0.3}}
-    authors = Case("rig", {}, authors={"parameters": {"body_mass": 0.6}, "effects": effects})
-    model = authors.authors_model(nominal, "task.cases.rig.authors")
-    assert model is not None
-    assert dict(model.parameters) == {**nominal.parameters, "body_mass": 0.6}
-    assert {name: dict(values) for name, values in model.effects.items()} == effects
-    assert nominal.value("pitch/viscous.sigma") == 0.1
-
-
-def test_without_a_published_model_there_is_none():
-    assert Case("rig", {}).authors_model(pendulum(), "task.cases.rig.authors") is None
-
-
-def test_a_mistyped_authors_model_names_its_key():
-    case = Case("rig", {}, authors={"effects": {"pitch/coulom": {"F_c": 0.3}}})
-    with pytest.raises(InputError, match=r"task\.cases\.rig\.authors.*did you mean pitch/coulomb"):
-        case.authors_model(pendulum(), "task.cases.rig.authors")
-
-
-def test_a_case_widens_the_uncertainty_of_a_dataset():
-    robot = {"plant": "pendulum", "uncertainty": {"body_inertia": 0.3}}
-    chosen = Case("rig", {}, uncertainty={"com_height": 0.1}).of(RecordingSource(robot=robot))
-    assert chosen.robot is not None
-    assert chosen.robot["uncertainty"] == {"body_inertia": 0.3, "com_height": 0.1}
-    assert robot["uncertainty"] == {"body_inertia": 0.3}
 
 
 def test_the_diagnosis_is_given_the_rows_to_fit_alone(folder):

@@ -19,15 +19,16 @@ from wipx.core.model import Model
 from wipx.core.recording import Recording, RecordingSplit
 from wipx.diagnosis.inquiry import HORIZON
 from wipx.diagnosis.suspects import check_suspects
-from wipx.identify.evaluation import Judge
-from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
-from wipx.recordings.model_file import check_keys, mapping_of, model_from_mapping, write_model
+from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.diagnose import Diagnose
 from wipx.tasks.job import Job
+from wipx.tasks.published import Published, published_of
 from wipx.tasks.real_table import HeldOutErrors, Outcome, markdown
 from wipx.tasks.results import replace_table, write_json, written_together
+from wipx.tasks.rival_answers import ask, check_methods
+from wipx.tasks.unseen import unseen
 
 
 @dataclass(frozen=True)
@@ -36,58 +37,23 @@ class Case:
 
     Attributes:
         dataset: Name of the source.
-        known: What the authors found missing, by "site/kind", with the figure that they give, in words.
-        authors: Their full model: `parameters` and `effects` that replace or join those of the nominal one, as in
-            robot.yaml; empty where they published none.
-        figures: Their figures of known effects, by symbol [SI], where `authors` has none.
+        published: Settings of `Published`: what the authors found missing.
         spans: Parts of recordings to use instead of the dataset's, as in `RecordingSource`.
-        uncertainty: Relative standard deviation of further nominal numbers that are not exact.
         horizons: Lengths of the predictions by which models are judged [s].
-        lead: Time before a prediction from which its state is estimated [s].
     """
 
     dataset: str
-    known: dict[str, str]
-    authors: dict[str, dict[str, Any]] = field(default_factory=dict)
-    figures: dict[str, dict[str, float]] = field(default_factory=dict)
+    published: dict[str, Any] = field(default_factory=dict)
     spans: dict[str, list[float | None]] = field(default_factory=dict)
-    uncertainty: dict[str, float] = field(default_factory=dict)
     horizons: tuple[float, ...] = (HORIZON,)
-    lead: float = 0.1
 
     def __post_init__(self) -> None:
         for horizon in self.horizons:
             check_positive(horizons=horizon)
-        check_positive(lead=self.lead)
-        for name in self.figures:
-            if name not in self.known:
-                raise unknown_name("effect", name, self.known, "task.cases: figures")
 
     def of(self, source: RecordingSource) -> RecordingSource:
         """A dataset with the case's own choices."""
-        robot = source.robot
-        if robot is not None and self.uncertainty:
-            robot = {**robot, "uncertainty": {**robot.get("uncertainty", {}), **self.uncertainty}}
-        return replace(source, robot=robot, spans=self.spans or source.spans)
-
-    @property
-    def suspects(self) -> dict[str, dict[str, float]]:
-        """The known effects with the authors' figures [SI]; without any where they give none."""
-        published = {**self.authors.get("effects", {}), **self.figures}
-        return {name: published.get(name, {}) for name in self.known}
-
-    def authors_model(self, nominal: Model, where: str) -> Model | None:
-        """The authors' full model; None where they published none.
-
-        Raises:
-            InputError: the model is at fault; `where` is its key.
-        """
-        if not self.authors:
-            return None
-        check_keys(self.authors, ("parameters", "effects"), where)
-        parameters = {**nominal.parameters, **mapping_of(self.authors, "parameters", where)}
-        effects = {**nominal.effects, **mapping_of(self.authors, "effects", where)}
-        return model_from_mapping({"plant": nominal.plant.kind, "parameters": parameters, "effects": effects}, where)
+        return replace(source, spans=self.spans or source.spans)
 
 
 @dataclass(frozen=True)
@@ -98,12 +64,14 @@ class Prepared:
         case: Its settings.
         source: The dataset with the case's own choices.
         split: What the diagnosis sees, and what it does not.
+        published: What the authors published.
         authors: The authors' full model; None where they published none.
     """
 
     case: Case
     source: RecordingSource
     split: RecordingSplit
+    published: Published
     authors: Model | None
 
 
@@ -114,19 +82,24 @@ class RealRecordings:
     Attributes:
         sources: Options of the group `recordings`, by name.
         cases: Settings of the cases, by name.
+        methods: Options of the group `rival`, by name.
         only: Names of the cases to run; empty for all.
+        rivals: Methods that are given the same recordings, names of `methods`.
         page: Markdown file whose part between the table marks is replaced; None for none.
     """
 
     sources: dict[str, Any] = field(default_factory=dict)
     cases: dict[str, Any] = field(default_factory=dict)
+    methods: dict[str, Any] = field(default_factory=dict)
     only: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
     page: str | None = None
 
     def __post_init__(self) -> None:
         for name in self.only:
             if name not in self.cases:
                 raise unknown_name("case", name, self.cases, "task.only")
+        check_methods(self.rivals, self.methods)
 
     def run(self, job: Job) -> None:
         """Diagnose case by case and write the table."""
@@ -134,12 +107,16 @@ class RealRecordings:
         outcomes = []
         for number, (name, one) in enumerate(prepared.items(), start=1):
             print(f"\n[{number}/{len(prepared)}] {name}")
-            outcomes.append(outcome_of(replace(job, out=job.out / name), one))
+            outcomes.append(outcome_of(replace(job, out=job.out / name), one, self._rivals))
         table = markdown(outcomes)
         (job.out / "table.md").write_text(table, encoding="utf-8")
         if self.page is not None:
             replace_table(Path(self.page), table)
         print(f"\n{table}\ntable: {job.out / 'table.md'}")
+
+    @property
+    def _rivals(self) -> dict[str, Any]:
+        return {name: self.methods[name] for name in self.rivals}
 
     def _prepared(self, job: Job) -> dict[str, Prepared]:
         """Every dataset, read before the first diagnosis, so that a missing one is reported at once."""
@@ -154,10 +131,11 @@ class RealRecordings:
         for name, case in cases.items():
             source = sources[name]
             where, nominal, recordings = f"task.cases.{name}", source.describe().model, source.load()
-            authors = case.authors_model(nominal, f"{where}.authors")
+            published = published_of(job, case.published, f"{where}.published")
+            authors = published.authors_model(nominal, f"{where}.published.authors")
             split = source.split(recordings)
-            check_suspects(case.suspects, nominal, scales_of(nominal, split.fit), f"{where}.known")
-            prepared[name] = Prepared(case, source, split, authors)
+            check_suspects(published.suspects, nominal, scales_of(nominal, split.fit), f"{where}.published.known")
+            prepared[name] = Prepared(case, source, split, published, authors)
         return prepared
 
     def _source(self, job: Job, dataset: str) -> RecordingSource:
@@ -181,17 +159,18 @@ def check_there(sources: Iterable[RecordingSource]) -> None:
         raise InputError(f"recordings are missing; get them, or set WIPX_RECORDINGS=FOLDER: {'; '.join(missing)}")
 
 
-def outcome_of(job: Job, prepared: Prepared) -> Outcome:
-    """Diagnose what is to be fitted, and predict what is held out.
+def outcome_of(job: Job, prepared: Prepared, rivals: Mapping[str, Any]) -> Outcome:
+    """Diagnose what is to be fitted, and predict what is held out; other methods, settings by name, do the same.
 
     Leaves heldout.json, heldout.png and, where there is one, authors.yaml beside the diagnosis.
     """
-    case, source, split = prepared.case, prepared.source, prepared.split
+    case, source, split, published = prepared.case, prepared.source, prepared.split, prepared.published
+    seen = only(source, split.fit)
     try:
-        diagnosis = Diagnose(case.lead, case.suspects).of(job, only(source, split.fit))
+        diagnosis = Diagnose(published.suspects).of(job, seen)
     except InputError as refusal:
         print(f"refused: {refusal}")
-        return Outcome(source.name, case.known, None, (), str(refusal))
+        return Outcome(source.name, published, None, (), str(refusal))
     errors = tuple(_errors(job, prepared, diagnosis, horizon) for horizon in case.horizons)
     with written_together(job.out) as folder:
         recordings = [recording.name for recording in split.held_out]
@@ -199,7 +178,9 @@ def outcome_of(job: Job, prepared: Prepared) -> Outcome:
         _draw(job, prepared, diagnosis, folder / "heldout.png")
         if prepared.authors is not None:
             write_model(prepared.authors, folder / "authors.yaml")
-    return Outcome(source.name, case.known, diagnosis, errors)
+    predicted = unseen(job, seen, split.held_out)
+    answers = (ask(job, method, settings, seen, predicted) for method, settings in rivals.items())
+    return Outcome(source.name, published, diagnosis, errors, rivals=tuple(answers))
 
 
 def only(source: RecordingSource, recordings: tuple[Recording, ...]) -> RecordingSource:
@@ -210,18 +191,10 @@ def only(source: RecordingSource, recordings: tuple[Recording, ...]) -> Recordin
     return replace(source, files=list(spans), spans=spans)
 
 
-def _judge(job: Job, prepared: Prepared, horizon: float) -> Judge:
-    split = prepared.split
-    noise = sensor_noise(split.fit, prepared.source.describe().model.plant)
-    return Judge(job.part("sim"), noise, horizon, prepared.case.lead)
-
-
 def _errors(job: Job, prepared: Prepared, diagnosis: Diagnosis, horizon: float) -> HeldOutErrors:
-    judge, held_out = _judge(job, prepared, horizon), prepared.split.held_out
-    found, _ = judge.compare(diagnosis.nominal, diagnosis.model, held_out, held_out=True)
-    authors: Mapping[str, float] | None = None
-    if prepared.authors is not None:
-        authors = judge.compare(diagnosis.nominal, prepared.authors, held_out, held_out=True)[0].completed
+    predicted = unseen(job, only(prepared.source, prepared.split.fit), prepared.split.held_out, horizon)
+    found, _ = predicted.compare(diagnosis.nominal, diagnosis.model)
+    authors = None if prepared.authors is None else predicted.errors(prepared.authors)
     return HeldOutErrors(horizon, found.nominal, found.completed, authors, found.noise_floor)
 
 
@@ -229,6 +202,7 @@ def _draw(job: Job, prepared: Prepared, diagnosis: Diagnosis, path: Path) -> Non
     """The picture of a diagnosis, with predictions of the held-out recordings instead of those that it saw."""
     from wipx.report.diagnosis_figure import draw_diagnosis
 
-    judge = _judge(job, prepared, prepared.case.horizons[0])
-    errors, traces = judge.compare(diagnosis.nominal, diagnosis.model, prepared.split.held_out, held_out=True)
+    seen = only(prepared.source, prepared.split.fit)
+    predicted = unseen(job, seen, prepared.split.held_out, prepared.case.horizons[0])
+    errors, traces = predicted.compare(diagnosis.nominal, diagnosis.model)
     draw_diagnosis(replace(diagnosis, held_out=errors, traces=traces), path)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from wipx.core.diagnosis import Diagnosis, FoundEffect, Suspect
 from wipx.report.diagnosis_words import nats, value_in_words
 from wipx.report.numbers import compact, significant
+from wipx.tasks.published import Published
+from wipx.tasks.rival_answers import MethodAnswer, NamedEffect
 
 HEAD = (
     "recordings",
@@ -20,6 +22,7 @@ HEAD = (
     "the authors' full model",
     "sensor noise",
 )
+METHODS_HEAD = ("recordings", "method", "named", "main effects", "names not published", "error over 0.5 s", "time [s]")
 
 
 @dataclass(frozen=True)
@@ -47,28 +50,61 @@ class Outcome:
 
     Attributes:
         title: Of the dataset.
-        known: What the authors found missing, by "site/kind", with their figure in words.
+        published: What the authors found missing.
         diagnosis: The answer; None where the diagnosis refused the recordings.
         errors: One entry per horizon; empty without an answer.
         refusal: Why there is no answer; empty where there is one.
     """
 
     title: str
-    known: Mapping[str, str]
+    published: Published
     diagnosis: Diagnosis | None
     errors: tuple[HeldOutErrors, ...]
     refusal: str = ""
+    rivals: tuple[MethodAnswer, ...] = ()
 
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
-    """All outcomes as one Markdown table."""
-    lines = [HEAD, ("---",) * len(HEAD), *map(cells, outcomes)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    """All outcomes as one Markdown table, and a second one where other methods were asked."""
+    table = _table(HEAD, map(cells, outcomes))
+    compared = [row for outcome in outcomes if outcome.rivals for row in method_rows(outcome)]
+    return f"{table}\n{_table(METHODS_HEAD, compared)}" if compared else table
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    return "".join(f"| {' | '.join(line)} |\n" for line in (head, ("---",) * len(head), *rows))
+
+
+def method_rows(outcome: Outcome) -> list[tuple[str, ...]]:
+    """The diagnosis and every other method as cells under `METHODS_HEAD`."""
+    if outcome.diagnosis is None:
+        return []
+    effects, completed = outcome.diagnosis.effects, outcome.errors[0].completed
+    ours = MethodAnswer(
+        "wipx", tuple(NamedEffect(e.name, e.equivalent) for e in effects), completed, outcome.diagnosis.seconds
+    )
+    return [_method_cells(outcome, answer, outcome.diagnosis.units) for answer in (ours, *outcome.rivals)]
+
+
+def _method_cells(outcome: Outcome, answer: MethodAnswer, units: Mapping[str, str]) -> tuple[str, ...]:
+    if answer.refusal:
+        return (outcome.title, answer.method, f"no answer: {answer.refusal}", *("-",) * (len(METHODS_HEAD) - 3))
+    published = outcome.published
+    namings = list(published.naming(answer.effects).values())
+    return (
+        outcome.title,
+        answer.method,
+        _stacked(effect.name for effect in answer.effects) or "nothing",
+        f"{len(namings) - namings.count('missed')} of {len(namings)}",
+        str(len(published.not_published(answer.effects))),
+        _in_units(answer.errors, units),
+        f"{answer.seconds:.0f}",
+    )
 
 
 def cells(outcome: Outcome) -> tuple[str, ...]:
     """An outcome as cells under `HEAD`."""
-    known = _stacked(f"{name}: {figure}" for name, figure in outcome.known.items())
+    known = _stacked(f"{name}: {figure}" for name, figure in outcome.published.known.items())
     if outcome.diagnosis is None:
         return (outcome.title, known, f"no answer: {outcome.refusal}", *("-",) * (len(HEAD) - 3))
     effects, units = outcome.diagnosis.effects, outcome.diagnosis.units
@@ -76,7 +112,7 @@ def cells(outcome: Outcome) -> tuple[str, ...]:
         outcome.title,
         known,
         _stacked(map(_shown, effects)) or "nothing",
-        score(outcome.known, effects),
+        score(outcome.published.known, effects),
         _stacked(map(asked, outcome.diagnosis.suspects)),
         outcome.diagnosis.verdict,
         _stacked(f"{e.horizon:g} s" for e in outcome.errors),
