@@ -14,7 +14,7 @@ LEAN = {"name": "geometry/com_offset", "parameters": {"theta_eq": 0.02}}
 def truth(*effects: dict[str, Any], tier: str = "single_clear", **more: Any) -> dict[str, Any]:
     contrast = {effect["name"]: {"x": 2.0, "theta": 20.0} for effect in effects}
     plain = {"plant": "wip", "outside": None, "regions": [], "times": [], "contrast": contrast}
-    return {**plain, "tier": tier, "effects": list(effects), **more}
+    return {**plain, "dirt": None, "known": [], "tier": tier, "effects": list(effects), **more}
 
 
 def named(name: str, equivalent: tuple[str, ...] = (), **values: tuple[float, float, float]) -> dict[str, Any]:

@@ -263,11 +263,14 @@ def _balanced(machine: Machine, names: tuple[str, ...], draw: Draw) -> Machine |
         details = {name: draw_details(name, values, draw) for name, values in effects.items()}
         machine = replace(machine, hidden=Hidden(effects, details))
         errors = prediction_errors(replace(machine, shown=machine.shown[-1:]), names, 0.0)
-        if errors is not None and _all_matter(errors):
+        if errors is None:
+            again = names
+        elif _all_matter(errors):
             return machine
-        order = names if errors is None else sorted(names, key=lambda name: errors.own[name])
-        again = (order[0], order[-1])
-        effects |= {name: draw_values(name, draw) for name in again}  # the one that matters least, and most
+        else:
+            order = sorted(names, key=errors.own.__getitem__)
+            again = (order[0], order[-1])
+        effects = {**effects, **{name: draw_values(name, draw) for name in again}}
     return None
 
 

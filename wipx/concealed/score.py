@@ -9,6 +9,8 @@ from itertools import pairwise, permutations
 from math import isfinite, sqrt
 from typing import Any
 
+from wipx.concealed.dirty_score import DirtyScore, dirty_score
+
 LEAST_SHARE = 0.1  # of the mismatch that a site must be given to count as named
 
 
@@ -20,11 +22,14 @@ class UnseenErrors:
         nominal: Of the owner's model.
         completed: Of the completed model.
         floor: What a perfect model would leave.
+        reference: Of the true effects, fitted to the visible recordings; of a robot with dirt only, of the owner's
+            model. None where that is not known, as for exact robots.
     """
 
     nominal: Mapping[str, float]
     completed: Mapping[str, float]
     floor: Mapping[str, float]
+    reference: Mapping[str, float] | None = None
 
     def removed(self) -> float | None:
         """Share of the explainable squared error that is gone; None where the nominal model leaves none.
@@ -37,7 +42,14 @@ class UnseenErrors:
 
     def over_floor(self) -> float | None:
         """Error of the completed model in units of the floor, root mean square over signals; None where it diverges."""
-        squares = [(self.completed[name] / floor) ** 2 for name, floor in self.floor.items()]
+        return self._over(self.floor)
+
+    def over_reference(self) -> float | None:
+        """The same in units of the reference."""
+        return None if self.reference is None else self._over(self.reference)
+
+    def _over(self, unit: Mapping[str, float]) -> float | None:
+        squares = [(self.completed[name] / size) ** 2 for name, size in unit.items()]
         return sqrt(sum(squares) / len(squares)) if isfinite(sum(squares)) else None
 
 
@@ -97,6 +109,8 @@ class CaseScore:
         over_floor: Error there over what a perfect model would leave.
         seconds: Time of the diagnosis [s].
         failure: Why there is no answer; empty where there is one.
+        dirty: What was named of a dirty robot, of which `exact` forgives laws that correct what the owner has wrong;
+            None for an exact robot.
     """
 
     case: str
@@ -120,12 +134,15 @@ class CaseScore:
     over_floor: float | None
     seconds: float
     failure: str = ""
+    dirty: DirtyScore | None = None
 
     @property
     def accused(self) -> bool | None:
         """Whether a false alarm was raised: physics named that is not hidden, or left over where none is hidden."""
         if self.outside is not None or self.failure:
             return None
+        if self.dirty is not None:  # something is left over of every dirty robot
+            return self.dirty.false_laws > 0
         return self.false_alarms > 0 or (not self.truth and self.verdict != "consistent")
 
 
@@ -151,6 +168,11 @@ def score(
     found = matches(tuple(hidden), named)
     expected = "unexplained" if outside else "mismatch" if hidden else "consistent"
     location = diagnosis["location"]
+    dirty = None
+    if truth["dirt"] is not None:
+        dirty = dirty_score(truth, tuple(named), found, None if errors is None else errors.over_reference())
+    allowed = len(named) if dirty is None else len(named) - dirty.corrected
+    right = verdict == expected if dirty is None else _right_of_dirty(verdict, dirty)
     return CaseScore(
         case=case,
         tier=truth["tier"],
@@ -160,9 +182,9 @@ def score(
         contrast=_contrast(truth["contrast"]),
         answer=tuple(named),
         verdict=verdict,
-        exact=None if outside else len(found) == len(hidden) == len(named),
-        false_alarms=len(named) - len(found),
-        verdict_right=verdict == expected,
+        exact=None if outside else len(found) == len(hidden) == allowed,
+        false_alarms=len(named) - len(found) if dirty is None else dirty.false_laws,
+        verdict_right=right,
         site_right=_site_right(found, tuple(hidden), location["sites"]) if hidden else None,
         region_error=_region_error(truth["regions"], location["regions"]),
         time_error=_time_error(truth["times"], location["times"]),
@@ -172,7 +194,13 @@ def score(
         removed=errors.removed() if errors is not None and (hidden or outside) else None,
         over_floor=None if errors is None else errors.over_floor(),
         seconds=seconds,
+        dirty=dirty,
     )
+
+
+def _right_of_dirty(verdict: str, dirty: DirtyScore) -> bool:
+    """Whether a verdict on a dirty robot is right: physics is missing, or, with dirt only, no law of it is named."""
+    return verdict != "consistent" if dirty.dominant else dirty.false_laws == 0
 
 
 def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) -> CaseScore:
@@ -201,6 +229,7 @@ def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) ->
         over_floor=None,
         seconds=seconds,
         failure=failure,
+        dirty=None if truth["dirt"] is None else DirtyScore(len(hidden), 0, 0, 0, 0, None),
     )
 
 

@@ -9,7 +9,7 @@ from math import inf, isfinite
 import numpy as np
 from scipy.stats import beta
 
-from wipx.concealed.cases import TIERS
+from wipx.concealed.cases import DIRTY_TIERS, TIERS
 from wipx.concealed.score import CaseScore, ParameterScore
 
 CONFIDENCE = 0.95
@@ -87,8 +87,8 @@ class GroupScore:
 
 
 def by_tier(scores: Sequence[CaseScore]) -> tuple[GroupScore, ...]:
-    """Scores by tier, in the order of `TIERS`, and of all cases; tiers without cases are left out."""
-    groups = [(tier, [one for one in scores if one.tier == tier]) for tier in TIERS]
+    """Scores by tier, in the order of `TIERS` and `DIRTY_TIERS`, and of all cases; tiers without cases are left out."""
+    groups = [(tier, [one for one in scores if one.tier == tier]) for tier in (*TIERS, *DIRTY_TIERS)]
     return tuple(group_score(name, group) for name, group in [*groups, ("all", list(scores))] if group)
 
 

@@ -64,6 +64,7 @@ def truth(case: Case) -> dict[str, object]:
         "tier": case.tier,
         "plant": case.robot.kind,
         "effects": [{"name": name, "parameters": dict(values)} for name, values in hidden.effects.items()],
+        "known": list(case.known),
         "outside": None if oddity is None else {"name": oddity.name, "joint": oddity.joint, **oddity.values},
         "regions": [
             {"signal": "x", "low": values["lo"], "high": values["hi"]}

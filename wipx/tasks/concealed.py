@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from wipx.concealed.cases import TIERS, stratified
+from wipx.concealed.cases import DIRTY_TIERS, TIERS, stratified
 from wipx.concealed.folder import RunFolder, read_json
 from wipx.concealed.scenario import LENGTHS
 from wipx.core.errors import InputError, unknown_name
@@ -69,7 +69,7 @@ class Concealed:
         seed: Of the draws; None for a fresh one.
         lengths: Shortest and longest time that a recording lasts [s].
         workers: Processes that draw and diagnose.
-        tiers: Tiers to draw from; empty for all.
+        tiers: Tiers to draw from; empty for all of exact robots.
         rivals: Other methods that diagnose the same recordings, options of the group `rival`.
         rivals_cases: On how many of the cases; a sample of all tiers.
         time_limit: For one diagnosis [s].
@@ -98,8 +98,8 @@ class Concealed:
                 f"both from {SHORTEST:g} to {LONGEST:g} s"
             )
         for tier in self.tiers:
-            if tier not in TIERS:
-                raise unknown_name("tier", tier, TIERS, "task.tiers")
+            if tier not in {**TIERS, **DIRTY_TIERS}:
+                raise unknown_name("tier", tier, (*TIERS, *DIRTY_TIERS), "task.tiers")
 
     def run(self, job: Job) -> None:
         """Diagnose all cases and write the tables and the page."""

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wipx.concealed.cases import draw_case
+from wipx.concealed.cases import DIRTY_TIERS, draw_case
+from wipx.concealed.dirty import draw_dirty
 from wipx.concealed.folder import RunFolder
 from wipx.concealed.seal import Sealed, seal
 from wipx.concealed.write import case_files, write_files
@@ -23,7 +24,8 @@ def draw_and_seal(path: Path, case: str, tier: str, seed: int, lengths: tuple[fl
     """
     folder = RunFolder(path)
     own = seed_of(seed, case)
-    files = case_files(draw_case(np.random.default_rng(own), tier, lengths))
+    draw = draw_dirty if tier in DIRTY_TIERS else draw_case
+    files = case_files(draw(np.random.default_rng(own), tier, lengths))
     sealed = seal(case, files.visible, {"seed": own, "truth": files.truth, "unseen": files.unseen})
     write_files(folder.recordings(case), files.visible)
     folder.seal(case).parent.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wipx.concealed.dirty_score import DirtyScore
 from wipx.concealed.folder import RunFolder, read_json
 from wipx.concealed.score import CaseScore, ParameterScore, UnseenErrors, failed, score
 from wipx.concealed.seal import Commitment, digest_of_folder, unseal
@@ -19,6 +20,7 @@ from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.concealed_diagnose import Answer, read_answers
+from wipx.tasks.concealed_reference import best_fit
 from wipx.tasks.predict import Predict
 from wipx.tasks.results import write_json
 from wipx.tasks.rival import NETWORK
@@ -58,7 +60,7 @@ def judge(path: Path, case: str, key: str) -> Opened:
     content = verified(folder, read_commitments(folder)[case], key)
     answers = read_answers(folder.answers(case))
     with tempfile.TemporaryDirectory(prefix="unseen-") as private:  # readable by this user alone
-        unseen = Unseen(Path(private), content)
+        unseen = Unseen(Path(private), content, folder.recordings(case))
         errors = {
             method: None if answer.failure else unseen.errors(folder.answer(case, method))
             for method, answer in answers.items()
@@ -112,9 +114,10 @@ class Unseen:
     Attributes:
         floor: Errors that the true model leaves, where the vocabulary has it, and never less than the sensors' noise
             with what it does to the state from which a prediction starts, by signal [m, rad].
+        reference: Errors of the true effects, fitted to the visible recordings of a dirty robot; None for an exact one.
     """
 
-    def __init__(self, private: Path, content: Mapping[str, Any]) -> None:
+    def __init__(self, private: Path, content: Mapping[str, Any], visible: Path) -> None:
         write_files(private / "recordings", content["unseen"])
         source = RecordingSource(path=str(private / "recordings"))
         self._nominal, self._recordings = source.describe().model, source.load()
@@ -126,6 +129,12 @@ class Unseen:
             name: float(np.nanmax([noise, floor.get(name, 0.0), 0.0 if truth["outside"] else best.get(name, 0.0)]))
             for name, noise in truth["noise"].items()
         }
+        self.reference = None
+        if truth["dirt"] is not None:
+            fitted = self._predicted(
+                best_fit(self._nominal, hidden, RecordingSource(path=str(visible)).load(), SIMULATOR)
+            )
+            self.reference = None if fitted is None else fitted.completed
 
     def errors(self, answer: Path) -> UnseenErrors | None:
         """Errors of the nominal model and of a method's; None where the recordings cannot be predicted."""
@@ -137,7 +146,7 @@ class Unseen:
         found = self._predicted(model, str(network) if network.is_file() else None)
         if found is None or not np.isfinite([*found.completed.values(), *found.nominal.values()]).all():
             return None
-        return UnseenErrors(found.nominal, found.completed, self.floor)
+        return UnseenErrors(found.nominal, found.completed, self.floor, self.reference)
 
     def _predicted(self, model: Model, residual: str | None = None) -> FitErrors | None:
         """What `task=predict` has in metrics.json; None where the prediction fails."""
@@ -180,4 +189,6 @@ def read_opened(path: Path) -> Opened:
 
 def _score_from(entry: dict[str, Any]) -> CaseScore:
     names = {name: tuple(entry[name]) for name in ("truth", "answer")}
-    return CaseScore(**{**entry, **names, "parameters": tuple(ParameterScore(**one) for one in entry["parameters"])})
+    parameters = tuple(ParameterScore(**one) for one in entry["parameters"])
+    dirty = None if entry.get("dirty") is None else DirtyScore(**entry["dirty"])
+    return CaseScore(**{**entry, **names, "parameters": parameters, "dirty": dirty})
