@@ -9,7 +9,7 @@ from diagnosis.recorded import recorded, write_folder
 from wipx.core.sizes import Size
 from wipx.recordings.source import RecordingSource
 from wipx.tasks import real_consistency
-from wipx.tasks.consistency_table import markdown
+from wipx.tasks.consistency_table import markdown, size_series
 from wipx.tasks.diagnose import Diagnose
 from wipx.tasks.group_results import OURS, GroupResult, read_group, write_group
 from wipx.tasks.published import Published
@@ -86,6 +86,15 @@ def test_the_tables_count_names_errors_and_agreements():
     assert "| error over that of identify, told the names: worst | wipx | 6.00 |" in table
 
 
+def test_the_figure_shows_known_effects_first_beside_the_authors_figure():
+    other = Size("actuator/delay", "tau", 0.01, 0.0, 0.02, "s")
+    published = replace(PUBLISHED, authors={"effects": {"translation/coulomb": {"F_c": 0.5}}})
+    results = [result("group01", other, size(0.5, 0.1)), result("group02", other)]
+    first, second = size_series(results, {"own": ("Axis", published)})
+    assert (first.rig, first.ways, first.sizes, first.published) == ("Axis", ("pairs",), (size(0.5, 0.1),), 0.5)
+    assert (second.sizes, second.published) == ((other, other), None)
+
+
 def test_each_group_is_diagnosed_once_and_predicts_the_others(
     program, axis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -150,7 +159,7 @@ def test_missing_recordings_are_named_in_one_line(program, monkeypatch: pytest.M
     answer = program("+experiment=real_consistency", "hydra.run.dir=out")
     assert answer.status == 2
     assert len(answer.error.strip().splitlines()) == 1
-    for part in ("disk_*.csv", "visible/*.csv", "github.com/Rhoban/bam", "WIPX_RECORDINGS=FOLDER"):
+    for part in ("disk_2024*.csv", "visible/*.csv", "github.com/Rhoban/bam", "WIPX_RECORDINGS=FOLDER"):
         assert part in answer.error
 
 
@@ -167,7 +176,7 @@ def test_every_rig_at_hand_is_divided_into_disjoint_groups(
     monkeypatch.setattr(real_consistency, "_diagnosed", noted)
     answer = program("+experiment=real_consistency", "profile=consistency_full", "hydra.run.dir=out")
     assert (answer.status, answer.error) == (0, "")
-    assert len({group.rig for group in seen}) == 9
+    assert len({group.rig for group in seen}) == 10
     for group in seen:
         mine, others = {one.name for one in group.source.load()}, {one.name for one in group.others}
         assert mine

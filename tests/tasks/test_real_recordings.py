@@ -13,6 +13,7 @@ from wipx.recordings.source import RecordingSource
 from wipx.tasks.published import Published
 from wipx.tasks.real_recordings import only
 from wipx.tasks.real_table import HEAD, Outcome, asked, cells, markdown, score
+from wipx.tasks.rival_answers import MethodAnswer, NamedEffect
 
 RESULTS = {
     "authors.yaml",
@@ -46,6 +47,17 @@ def test_a_refusal_stays_in_the_table():
     assert cells(refused)[2] == "no answer: the recordings contradict its sign of u"
     head, rule, row = markdown([refused]).splitlines()
     assert head.count("|") == rule.count("|") == row.count("|") == len(HEAD) + 1
+
+
+def test_other_methods_stand_beside_the_answer():
+    published = Published({"pitch/coulomb": "F_c = 1 N m"}, main={"pitch/coulomb": ["stribeck"]})
+    ours = MethodAnswer("wipx", (NamedEffect("pitch/coulomb"),), {"theta": 0.01}, 17.0)
+    other = MethodAnswer("regression", (NamedEffect("actuator/lag"),), {"theta": 0.02}, 3.0)
+    failed = MethodAnswer("paper", refusal="too short")
+    table = markdown([Outcome("Rig", published, None, (), "", (ours, other, failed), {"theta": "rad"})])
+    assert "| Rig | wipx | pitch/coulomb | 1 of 1 | 0 | theta 0.01 rad | 17 |" in table
+    assert "| Rig | regression | actuator/lag | 0 of 1 | 1 | theta 0.02 rad | 3 |" in table
+    assert "| Rig | paper | no answer: too short | - | - | - | - |" in table
 
 
 def suspect(*, named: bool, gain: float, size: SuspectedSize | None, in_place_of: tuple[str, ...] = ()) -> Suspect:

@@ -169,21 +169,36 @@ def _pooled(results: Sequence[GroupResult], rigs: Rigs) -> list[tuple[str, ...]]
 
 
 def size_series(results: Sequence[GroupResult], rigs: Rigs) -> tuple[SizeSeries, ...]:
-    """Sizes over the groups of each rig: known effects first, then others, those that most groups name first."""
-    series = []
-    for rig, mine in _by_rig(results).items():
-        title, published = rigs[rig]
-        numbers: dict[tuple[str, str], list[tuple[GroupResult, Size]]] = {}
-        for result in mine:
-            for size in result.sizes:
-                numbers.setdefault((size.effect, size.symbol), []).append((result, size))
-        figures = published.suspects
-        ranked = sorted(numbers.items(), key=lambda item: (item[0][0] not in figures, -len(item[1])))
-        for (effect, symbol), sizes in ranked:
-            ways = tuple(result.way for result, _ in sizes)
-            figure = figures.get(effect, {}).get(symbol)
-            series.append(SizeSeries(title, ways, tuple(size for _, size in sizes), figure))
-    return tuple(series)
+    """Sizes over the groups of each rig, the most important first.
+
+    Known effects come before other laws of the same physics, these before the rest; of those, the first number of each
+    effect before its others, and what most groups name before what few name.
+    """
+    return tuple(one for rig, mine in _by_rig(results).items() for one in _series_of(mine, *rigs[rig]))
+
+
+def _series_of(results: Sequence[GroupResult], title: str, published: Published) -> list[SizeSeries]:
+    numbers: dict[tuple[str, str], list[tuple[GroupResult, Size]]] = {}
+    for result in results:
+        for size in result.sizes:
+            numbers.setdefault((size.effect, size.symbol), []).append((result, size))
+    figures = published.suspects
+    alike = {other for main in published.main for other in published.same_physics(main)}
+    first = {effect: symbol for effect, symbol in reversed(numbers)}
+
+    def rank(number: tuple[str, str]) -> tuple[bool, bool, bool, int]:
+        effect, symbol = number
+        return effect not in figures, effect not in alike, symbol != first[effect], -len(numbers[number])
+
+    return [
+        SizeSeries(
+            title,
+            tuple(result.way for result, _ in numbers[effect, symbol]),
+            tuple(size for _, size in numbers[effect, symbol]),
+            figures.get(effect, {}).get(symbol),
+        )
+        for effect, symbol in sorted(numbers, key=rank)
+    ]
 
 
 def _all_agreements(results: Sequence[GroupResult]) -> tuple[int, int]:

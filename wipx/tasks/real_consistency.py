@@ -8,7 +8,7 @@ and other methods. A group leaves a folder like that of `task=diagnose`, and is 
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ class Rig:
         dataset: Name of the source.
         ways: Settings of `Way`, by name.
         published: Settings of `Published`.
+        title: In place of the source's; None for that.
         files: Patterns of file names in place of the source's; empty for those.
         parts: Intervals [from, to] in s by pattern of file names, in place of the source's spans.
     """
@@ -49,6 +50,7 @@ class Rig:
     dataset: str
     ways: dict[str, dict[str, Any]]
     published: dict[str, Any] = field(default_factory=dict)
+    title: str | None = None
     files: list[str] = field(default_factory=list)
     parts: dict[str, list[list[float]]] = field(default_factory=dict)
 
@@ -131,7 +133,7 @@ class RealConsistency:
                 result, fresh = self._result(replace(job, out=job.out / group.label), group)
                 worked += fresh
                 results.append(result)
-        except KeyboardInterrupt:
+        except BaseException:
             if results:
                 self._write(job, results, published)
                 print(f"{len(results)} of {len(groups)} groups are done; the same command goes on")
@@ -164,7 +166,7 @@ class RealConsistency:
         if rig.dataset not in self.sources:
             raise unknown_name("dataset", rig.dataset, self.sources, "task.rigs")
         source = job.build(self.sources[rig.dataset], f"task.sources.{rig.dataset}")
-        return replace(source, files=rig.files or source.files)
+        return replace(source, files=rig.files or source.files, title=rig.title or source.title)
 
     def _groups(self, job: Job, name: str, rig: Rig, source: RecordingSource) -> list[Group]:
         where = f"task.rigs.{name}"
@@ -208,7 +210,8 @@ def _keep(job: Job, result: GroupResult, asked: Mapping[str, Any]) -> None:
 def _asked(job: Job, group: Group) -> dict[str, Any]:
     """What the result of a group depends on, beside the program."""
     spans = [[r.name, len(r), float(r.t[0]), float(r.t[-1])] for r in (*group.source.load(), *group.others)]
-    return {"robot": group.source.robot, "published": asdict(group.published), "recordings": spans, "seed": job.seed}
+    published = {"told": list(group.published.known), "authors": group.published.authors}
+    return {"robot": group.source.robot, **published, "recordings": spans, "seed": job.seed}
 
 
 def _diagnosed(job: Job, group: Group, predicted: Unseen) -> GroupResult:

@@ -23,11 +23,12 @@ from wipx.identify.parameter_space import scales_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.diagnose import Diagnose
+from wipx.tasks.group_results import OURS, answer_of
 from wipx.tasks.job import Job
 from wipx.tasks.published import Published, published_of
 from wipx.tasks.real_table import HeldOutErrors, Outcome, markdown
 from wipx.tasks.results import replace_table, write_json, written_together
-from wipx.tasks.rival_answers import ask, check_methods
+from wipx.tasks.rival_answers import MethodAnswer, ask, check_methods
 from wipx.tasks.unseen import unseen
 
 
@@ -166,21 +167,30 @@ def outcome_of(job: Job, prepared: Prepared, rivals: Mapping[str, Any]) -> Outco
     """
     case, source, split, published = prepared.case, prepared.source, prepared.split, prepared.published
     seen = only(source, split.fit)
+    predicted = unseen(job, seen, split.held_out)
+    plant = source.describe().model.plant
+    outcome = Outcome(source.name, published, None, (), units={c: plant.unit_of(c) for c in plant.coordinates})
     try:
         diagnosis = Diagnose(published.suspects).of(job, seen)
     except InputError as refusal:
         print(f"refused: {refusal}")
-        return Outcome(source.name, published, None, (), str(refusal))
-    errors = tuple(_errors(job, prepared, diagnosis, horizon) for horizon in case.horizons)
+        outcome, ours = replace(outcome, refusal=str(refusal)), MethodAnswer(OURS, refusal=str(refusal))
+    else:
+        errors = tuple(_errors(job, prepared, diagnosis, horizon) for horizon in case.horizons)
+        _write(job, prepared, diagnosis, errors)
+        outcome = replace(outcome, diagnosis=diagnosis, errors=errors)
+        ours = answer_of(diagnosis, predicted.errors(diagnosis.model))
+    others = tuple(ask(job, method, settings, seen, predicted) for method, settings in rivals.items())
+    return replace(outcome, methods=(ours, *others) if others else ())
+
+
+def _write(job: Job, prepared: Prepared, diagnosis: Diagnosis, errors: tuple[HeldOutErrors, ...]) -> None:
     with written_together(job.out) as folder:
-        recordings = [recording.name for recording in split.held_out]
+        recordings = [recording.name for recording in prepared.split.held_out]
         write_json(folder / "heldout.json", {"recordings": recordings, "errors": [asdict(e) for e in errors]})
         _draw(job, prepared, diagnosis, folder / "heldout.png")
         if prepared.authors is not None:
             write_model(prepared.authors, folder / "authors.yaml")
-    predicted = unseen(job, seen, split.held_out)
-    answers = (ask(job, method, settings, seen, predicted) for method, settings in rivals.items())
-    return Outcome(source.name, published, diagnosis, errors, rivals=tuple(answers))
 
 
 def only(source: RecordingSource, recordings: tuple[Recording, ...]) -> RecordingSource:

@@ -1,13 +1,13 @@
 """The table of `task=real_recordings`: what authors know of their robots, and what was found blind."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from wipx.core.diagnosis import Diagnosis, FoundEffect, Suspect
 from wipx.report.diagnosis_words import nats, value_in_words
 from wipx.report.numbers import compact, significant
 from wipx.tasks.published import Published
-from wipx.tasks.rival_answers import MethodAnswer, NamedEffect
+from wipx.tasks.rival_answers import MethodAnswer
 
 HEAD = (
     "recordings",
@@ -54,6 +54,8 @@ class Outcome:
         diagnosis: The answer; None where the diagnosis refused the recordings.
         errors: One entry per horizon; empty without an answer.
         refusal: Why there is no answer; empty where there is one.
+        methods: The answer beside those of other methods; empty where no other was asked.
+        units: SI unit by column.
     """
 
     title: str
@@ -61,13 +63,14 @@ class Outcome:
     diagnosis: Diagnosis | None
     errors: tuple[HeldOutErrors, ...]
     refusal: str = ""
-    rivals: tuple[MethodAnswer, ...] = ()
+    methods: tuple[MethodAnswer, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
     """All outcomes as one Markdown table, and a second one where other methods were asked."""
     table = _table(HEAD, map(cells, outcomes))
-    compared = [row for outcome in outcomes if outcome.rivals for row in method_rows(outcome)]
+    compared = [_method_cells(outcome, answer) for outcome in outcomes for answer in outcome.methods]
     return f"{table}\n{_table(METHODS_HEAD, compared)}" if compared else table
 
 
@@ -75,18 +78,8 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in (head, ("---",) * len(head), *rows))
 
 
-def method_rows(outcome: Outcome) -> list[tuple[str, ...]]:
-    """The diagnosis and every other method as cells under `METHODS_HEAD`."""
-    if outcome.diagnosis is None:
-        return []
-    effects, completed = outcome.diagnosis.effects, outcome.errors[0].completed
-    ours = MethodAnswer(
-        "wipx", tuple(NamedEffect(e.name, e.equivalent) for e in effects), completed, outcome.diagnosis.seconds
-    )
-    return [_method_cells(outcome, answer, outcome.diagnosis.units) for answer in (ours, *outcome.rivals)]
-
-
-def _method_cells(outcome: Outcome, answer: MethodAnswer, units: Mapping[str, str]) -> tuple[str, ...]:
+def _method_cells(outcome: Outcome, answer: MethodAnswer) -> tuple[str, ...]:
+    """A method's answer as cells under `METHODS_HEAD`."""
     if answer.refusal:
         return (outcome.title, answer.method, f"no answer: {answer.refusal}", *("-",) * (len(METHODS_HEAD) - 3))
     published = outcome.published
@@ -97,7 +90,7 @@ def _method_cells(outcome: Outcome, answer: MethodAnswer, units: Mapping[str, st
         _stacked(effect.name for effect in answer.effects) or "nothing",
         f"{len(namings) - namings.count('missed')} of {len(namings)}",
         str(len(published.not_published(answer.effects))),
-        _in_units(answer.errors, units),
+        _in_units(answer.errors, outcome.units),
         f"{answer.seconds:.0f}",
     )
 
