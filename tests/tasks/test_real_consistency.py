@@ -10,7 +10,6 @@ from wipx.core.sizes import Size
 from wipx.recordings.source import RecordingSource
 from wipx.tasks import real_consistency
 from wipx.tasks.consistency_table import markdown, size_series
-from wipx.tasks.diagnose import Diagnose
 from wipx.tasks.group_results import OURS, GroupResult, read_group, write_group
 from wipx.tasks.published import Published
 from wipx.tasks.rival_answers import MethodAnswer, NamedEffect
@@ -95,30 +94,40 @@ def test_the_figure_shows_known_effects_first_beside_the_authors_figure():
     assert (second.sizes, second.published) == ((other, other), None)
 
 
-def test_each_group_is_diagnosed_once_and_predicts_the_others(
-    program, axis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- table: begin -->\nold\n<!-- table: end -->\nafter\n")
+@pytest.mark.slow
+def test_each_group_is_diagnosed_and_predicts_the_others(program, axis: Path, tmp_path: Path):
     answer = program(*settings(axis))
     assert (answer.status, answer.error) == (0, "")
     out = tmp_path / "out"
     for group in ("group01", "group02"):
         assert {path.name for path in (out / "own" / "pairs" / group).iterdir()} >= RESULTS
     assert "| Axis | wipx | 2 | 2 | 0 | 0 | 0 | 0 |" in (out / "table.md").read_text()
+    assert "| groups that predict worse than the nominal model | wipx | 0 of 2 |" in (out / "table.md").read_text()
     assert (out / "sizes.png").read_bytes().startswith(b"\x89PNG")
 
-    def again(*_: object) -> None:
-        raise AssertionError("a group that is done was diagnosed again")
 
-    monkeypatch.setattr(Diagnose, "of", again)
-    answer = program(
-        *settings(axis, "task.rivals=[regression]", "task.methods.regression.seconds=2", f"task.page={page}")
-    )
+def test_a_group_that_is_done_is_only_given_to_methods_that_are_missing(
+    program, axis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- table: begin -->\nold\n<!-- table: end -->\nafter\n")
+    done: list[str] = []
+
+    def diagnosed(_: object, group: real_consistency.Group, *__: object) -> GroupResult:
+        done.append(group.name)
+        return result(group.name, size(0.5, 0.1))
+
+    monkeypatch.setattr(real_consistency, "_diagnosed", diagnosed)
+    assert program(*settings(axis)).status == 0
+    rivals = ("task.rivals=[regression]", "task.methods.regression.seconds=2")
+    answer = program(*settings(axis, *rivals, f"task.page={page}"))
     assert (answer.status, answer.error) == (0, "")
-    assert "| Axis | wipx | 2 | 2 | 0 | 0 | 0 | 0 |" in page.read_text()
-    assert "| Axis | regression | 2 |" in page.read_text()
+    assert done == ["group01", "group02"]
+    for row in ("| Axis | wipx | 2 | 2 | 0 | 0 | 0 | 0 |", "| Axis | regression | 2 |"):
+        assert row in page.read_text()
     assert "\nold\n" not in page.read_text()
+    assert program(*settings(axis, "seed=1")).status == 0
+    assert len(done) == 4  # another seed is another question
 
 
 def test_an_interrupted_run_leaves_the_table_of_what_is_done(
