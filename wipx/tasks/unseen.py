@@ -1,4 +1,4 @@
-"""How well models predict recordings that no fit saw; the one place that says how states are estimated there."""
+"""How well models predict recordings that no fit saw."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
