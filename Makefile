@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency concealed ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
+.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -35,6 +35,9 @@ consistency: $(READY)  ## diagnose every public rig from one group of runs after
 
 concealed: $(READY)  ## diagnose 30 fresh robots with concealed physics (PROFILE=full: 300, the table of docs/blind_results.md)
 	$(PY) -m wipx +experiment=concealed profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)
+
+dirty: $(READY)  ## diagnose 20 fresh dirty robots (PROFILE=full: 200, the table of docs/dirty_robots.md)
+	$(PY) -m wipx +experiment=dirty profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/dirty_robots.md)
 
 ablation-optim: $(READY)  ## compare nine optimizers, five seeds each (PROFILE=full: the paper's budget)
 	$(PY) -m wipx +experiment=ablation_optim$(SUFFIX) -m

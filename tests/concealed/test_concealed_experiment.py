@@ -25,6 +25,14 @@ def test_one_switch_chooses_the_size(profile: str, cases: int):
     assert 0 < task["rivals_cases"] < cases
 
 
+@pytest.mark.parametrize(("profile", "cases"), [("quick", 20), ("full", 200)])
+def test_dirty_robots_are_an_experiment_of_their_own(profile: str, cases: int):
+    task = yaml.safe_load(wipx("+experiment=dirty", f"profile={profile}", "--cfg", "job").stdout)["task"]
+    assert task["cases"] == cases
+    assert task["tiers"] == ["dirty", "dirt_only"]
+    assert 0 < task["rivals_cases"] < cases
+
+
 @pytest.mark.parametrize(
     ("argument", "message"),
     [

@@ -75,5 +75,6 @@ def _low_pass(values: np.ndarray, t: np.ndarray, time: float) -> np.ndarray:
     smooth = values.copy()
     keep = np.exp(-np.diff(t) / time)
     for row in range(1, len(values)):
-        smooth[row] = keep[row - 1] * smooth[row - 1] + (1.0 - keep[row - 1]) * values[row]
+        middle = 0.5 * (values[row - 1] + values[row])
+        smooth[row] = keep[row - 1] * smooth[row - 1] + (1.0 - keep[row - 1]) * middle
     return smooth

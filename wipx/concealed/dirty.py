@@ -43,6 +43,7 @@ SMALLEST = 0.2  # scale of the dirt; the largest is that of `dirt`
 NEAR = 1.15  # ratio to the drawn share from which a scale is good enough
 TRIALS = 6  # of scales
 OWN = 0.07  # least squared error that leaving out one dominant effect makes, of what leaving out all makes
+CANCEL = 2.0  # most such error: effects that all but undo each other have no error to measure dirt by
 OVER_DIRT = 0.7  # least such error, of what the dirt makes
 SHOWS = 3.0  # least difference that leaving it out makes in predictions, over the noise
 ATTEMPTS = 2  # robots for one choice of effects, before another choice
@@ -159,8 +160,6 @@ def realise_dirty(
     if found is None:
         return None
     scale, errors = found
-    if tier == "dirty" and not _all_matter(errors):
-        return None
     truth = machine.record(there, scale)
     blemishes, own = draw_blemishes(rng), np.random.default_rng(rng.integers(2**63))
     logs = []
@@ -327,8 +326,8 @@ def _scaled(machine: Machine, there: tuple[str, ...], share: float) -> tuple[flo
         if there:
             share = min(share, min(errors.own.values()) / OVER_DIRT)
         if 1.0 / NEAR < errors.share / share < NEAR and SHARE[0] <= errors.share <= SHARE[1]:
-            return scale, errors
-        if there and not _all_matter(errors):
+            return (scale, errors) if _all_matter(errors) else None
+        if not _all_matter(errors):
             return None
         if (scale == high and errors.share < share) or (scale == low and errors.share > share):
             return None
@@ -337,8 +336,8 @@ def _scaled(machine: Machine, there: tuple[str, ...], share: float) -> tuple[flo
 
 
 def _all_matter(errors: Errors) -> bool:
-    """Whether each dominant effect makes a part of the error, and shows."""
-    return all(share >= OWN for share in errors.own.values()) and all(
+    """Whether each dominant effect makes a part of the error, undoes no other, and shows."""
+    return all(OWN <= share <= CANCEL for share in errors.own.values()) and all(
         max(signals.values()) >= SHOWS for signals in errors.contrast.values()
     )
 

@@ -36,6 +36,7 @@ from wipx.report.score_page import (
     write_score_page,
 )
 from wipx.tasks.concealed_diagnose import OURS
+from wipx.tasks.concealed_dirty import dirty_row, dirty_sentence, dirty_tables
 from wipx.tasks.concealed_judge import Opened
 from wipx.tasks.concealed_proof import FALSE_ALARM_BAR, Account, bar, interval, notes, proof, robots
 from wipx.tasks.results import replace_table, write_json, written_together
@@ -83,6 +84,7 @@ def score_page_of(folder: RunFolder, cases: Sequence[Opened], account: Account) 
         check=f"python -m wipx task=concealed_check task.folder='{folder.path}'",
         methods=_methods(cases),
         groups=(
+            *dirty_tables(cases),
             *_groups("By tier", "", "tier", by_tier(scores)),
             *_groups("By signal to noise", f" {SIGNAL_TO_NOISE}", "signal to noise", by_contrast(scores)),
         ),
@@ -97,7 +99,7 @@ def _headline(scores: Sequence[CaseScore], alarms: Count) -> str:
     """What a reader should take away."""
     hidden = [one for one in scores if one.truth]
     outside = [one for one in scores if one.outside is not None]
-    parts = []
+    parts = [dirty_sentence(scores)] if any(one.dirty is not None for one in scores) else []
     if hidden:
         right = group_score("hidden", hidden).exact
         parts.append(f"Physics was hidden in {robots(right.total)} and named exactly in {right.right}.")
@@ -321,6 +323,7 @@ def _csv(cases: Sequence[Opened]) -> str:
     for method, one in ((method, score) for case in cases for method, score in case.scores.items()):
         row = {name: value for name, value in asdict(one).items() if value is not None}
         row |= {"method": method, "truth": " ".join(one.truth), "answer": " ".join(one.answer)}
+        row |= {"dirty": dirty_row(one)} if one.dirty is not None else {}
         row["parameters"] = " ".join(f"{p.name}={p.value:.6g}({p.true:.6g})" for p in one.parameters)
         writer.writerow(row)
     return text.getvalue()
