@@ -12,9 +12,9 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
 from wipx.diagnosis.case import Robot, diagnose
-from wipx.diagnosis.fitting import Fitter
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels, observer_gains
 from wipx.diagnosis.whiteness import colour_of
@@ -36,7 +36,7 @@ def measure_diagnosis() -> dict[str, float]:
     recordings = _record(nominal.with_effects(MISSING), nominal, np.random.default_rng(1))
     simulator = AnalyticSimulator(threads=1)
     log = Log.of(recordings, plant)
-    fitter = Fitter(Follower.of(simulator, log, nominal))
+    fitter = InnovationFitter(Follower.of(simulator, log, nominal))
     hypothesis = Hypothesis.of(Setting(nominal, {}, scales_of(nominal, recordings)), (), {})
     forces = 0.01 * np.exp(np.linspace(-2.0, 2.0, LEVELS))
     levels = [NoiseLevels(np.full(2, force), np.array(list(NOISE.values()))) for force in forces]

@@ -155,9 +155,7 @@ def silent(joints: int, features: int) -> ResidualAcceleration:
 def test_without_learned_acceleration_rollouts_are_those_of_the_simulator(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     (recording,) = record(VISCOUS, rng, count=1)
-    judges = (
-        Judge(s, np.array([NOISE]), 0.5) for s in (SIMULATOR, learned_simulator(silent(1, 3), np.array([NOISE])))
-    )
+    judges = (Judge(s, np.array([NOISE]), 0.5) for s in (SIMULATOR, learned_simulator(silent(1, 3), np.array([NOISE]))))
     analytic, learned = (judge.predict(pendulum(VISCOUS), (recording,))[0] for judge in judges)
     np.testing.assert_allclose(learned, analytic, atol=0.1 * NOISE)
 

@@ -14,9 +14,10 @@ from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.case import Robot as KnownRobot
 from wipx.diagnosis.case import diagnose
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.identify.noise import sensor_noise
@@ -50,8 +51,8 @@ class Bench:
         return Log.of(self.recordings, self.nominal.plant)
 
     @cached_property
-    def fitter(self) -> Fitter:
-        return Fitter(Follower.of(SIMULATOR, self.log, self.nominal))
+    def fitter(self) -> InnovationFitter:
+        return InnovationFitter(Follower.of(SIMULATOR, self.log, self.nominal))
 
     @cached_property
     def quiet(self) -> NoiseLevels:

@@ -154,7 +154,7 @@ def test_errors_are_as_large_as_they_are_said_to_be(fresh_seed: int):
     for seed in rng.integers(2**31, size=16):
         case = bench("linear_axis", {"translation/coulomb": {"F_c": truth}}, int(seed), count=1)
         fit = case.fit("translation/coulomb")
-        width = float(np.sqrt(covariance(fit, case.log)[0, 0]))
+        width = float(np.sqrt(covariance(fit)[0, 0]))
         low, high = (fit.hypothesis.at(fit.hypothesis.cube + s * width).values for s in (-1.0, 1.0))
         (name,) = fit.hypothesis.space.names
         scores.append((fit.hypothesis.values[name] - truth) / (0.5 * (high[name] - low[name])))

@@ -11,9 +11,10 @@ from wipx.core.diagnosis import NextExperiment
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.experiment import Question, next_experiment
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.menu import DURATION, Reach, menu
 from wipx.diagnosis.observer import NoiseLevels
@@ -37,8 +38,8 @@ class Case:
         self.fitter = self.fitter_of(self.log)
         self.fit = self.fitted(tuple(effects))
 
-    def fitter_of(self, log: Log) -> Fitter:
-        return Fitter(Follower.of(SIMULATOR, log, self.nominal))
+    def fitter_of(self, log: Log) -> InnovationFitter:
+        return InnovationFitter(Follower.of(SIMULATOR, log, self.nominal))
 
     def fitted(self, effects: tuple[str, ...]) -> Fit:
         force = np.array([1e-4 * self.setting.scales[site].force for site in self.nominal.plant.joints])

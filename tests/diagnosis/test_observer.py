@@ -15,20 +15,11 @@ from sim.robots import unit_axis
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.fitting import Fitter
 from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import SETTLES, Log
-from wipx.diagnosis.observer import (
-    BEFORE,
-    DIFFUSE,
-    UNSETTLED,
-    Gains,
-    Linearisation,
-    NoiseLevels,
-    linearise_along,
-    observer_gains,
-    transition_over,
-)
+from wipx.diagnosis.observer import BEFORE, DIFFUSE, UNSETTLED, Gains, NoiseLevels, observer_gains
+from wipx.identify.linearisation import Linearisation, linearise_along, transition_over
 from wipx.sim.analytic import Observer
 from wipx.sim.inputs import Inputs
 
@@ -83,7 +74,7 @@ def test_innovations_of_a_wrong_model_are_not(fresh_seed: int):
 def test_noise_levels_come_back(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     start = NoiseLevels(5.0 * LEVELS.force, LEVELS.sensor)
-    fitter = Fitter(case.fitter.follower)
+    fitter = InnovationFitter(case.fitter.follower)
     levels = fitter.levels_of(fitter.fit(Hypothesis.of(case.setting, (), {}), start))
     # Recordings of this length tell the logarithm within a standard deviation of 0.14; the search ends within 0.2.
     assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.2 + 4.5 * 0.14)
@@ -108,7 +99,7 @@ def test_gains_settle_at_the_solution_of_the_riccati_equation(kind: str):
     still = {name: np.zeros(len(t)) for name in (*model.plant.coordinates, *model.plant.commands)}
     log = Log.of((Recording("still.csv", {"t": t, **still}),), model.plant)
     levels = NoiseLevels(np.array([0.05, 0.02])[:joints], np.array([1e-4, 3e-4])[:joints])
-    linear = linearise_along(model, log)
+    linear = linearise_along(model, log.measured[:, : log.joints])
     (gains,) = observer_gains(linear, log, (levels,))
     a = np.block([[np.zeros((joints, joints)), np.eye(joints)], [linear.a[0]]])
     drive = np.zeros((2 * joints, 2 * joints))
@@ -169,7 +160,7 @@ def uneven_log(kind: str, rng: np.random.Generator) -> Log:
 def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late: float, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     log = uneven_log(kind, rng)
-    linear = linearise_along(nominal_model(kind), log)
+    linear = linearise_along(nominal_model(kind), log.measured[:, : log.joints])
     delays = (late,) * log.joints
     sizes = np.exp(rng.uniform(-7.0, -3.0, (3, log.joints + len(log.channels))))
     levels = [NoiseLevels(size[: log.joints], size[log.joints :]) for size in sizes]

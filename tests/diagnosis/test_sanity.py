@@ -9,9 +9,10 @@ from identify.emulated_robot import Robot, nominal_model
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.diagnosis.sanity import Slip, check_plausible, slips
@@ -50,7 +51,7 @@ def checked(model: Model, recordings: Recordings, effects: tuple[str, ...] = ())
     """Ask whether the model is plausible, where these effects are the best that could be added."""
     log = Log.of(recordings, model.plant)
     setting = Setting(model, {}, scales_of(model, recordings))
-    fitter = Fitter(Follower.of(AnalyticSimulator(threads=1), log, model))
+    fitter = InnovationFitter(Follower.of(AnalyticSimulator(threads=1), log, model))
     force = np.array([1e-3 * setting.scales[site].force for site in model.plant.joints])
     levels = NoiseLevels(force, sensor_noise(recordings, model.plant))
     nominal = fitted(fitter, setting, (), levels)
@@ -58,7 +59,7 @@ def checked(model: Model, recordings: Recordings, effects: tuple[str, ...] = ())
     check_plausible(fitter, setting, nominal, best, "robot.yaml")
 
 
-def fitted(fitter: Fitter, setting: Setting, effects: tuple[str, ...], levels: NoiseLevels) -> Fit:
+def fitted(fitter: InnovationFitter, setting: Setting, effects: tuple[str, ...], levels: NoiseLevels) -> Fit:
     return fitter.polished(fitter.fit(Hypothesis.of(setting, effects, {}), levels), rounds=2)
 
 

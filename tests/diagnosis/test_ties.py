@@ -63,6 +63,6 @@ def test_a_tie_is_told_to_the_reader_with_the_experiment_that_would_not_settle_i
 def test_tied_effects_predict_the_same():
     case = bench("wip", {"geometry/com_offset": {"theta_eq": 0.01}}, seed=7)
     models = [case.fit(name).hypothesis.model for name in ("geometry/com_offset", "sensor_theta/bias")]
-    judge = Judge(case.fitter.follower.simulator, case.quiet.sensor, 0.5)
+    judge = Judge(case.fitter.simulator, case.quiet.sensor, 0.5)
     for one, other in zip(*(judge.predict(model, case.recordings) for model in models), strict=True):
         assert abs(one - other)[~(one != one)].max() < 1e-5

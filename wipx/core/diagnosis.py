@@ -200,6 +200,66 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
+class LeftForce:
+    """The force on a joint that the completed model lacks.
+
+    Attributes:
+        site: The joint.
+        size: Root mean square [unit].
+        unit: "N" or "N m".
+        lasting: Time in which its correlation with itself falls to 1/e [s].
+        kind: What it is like: "law" over a signal, "periodic" in a coordinate, "swing" at a frequency, "gain" of a
+            command that drifts, or "random".
+        signal: Of which; None for a random force.
+        period: In the signal's unit, of a periodic force or a swing; None for others.
+        share: Of its variance that goes with the signal, on stretches of time that it was not fitted to.
+    """
+
+    site: str
+    size: float
+    unit: str
+    lasting: float
+    kind: str
+    signal: str | None
+    period: float | None
+    share: float
+
+
+@dataclass(frozen=True)
+class HorizonErrors:
+    """Errors of predictions some time after their start, on held-out recordings.
+
+    Attributes:
+        horizon: That time [s].
+        nominal: Root mean square errors of the nominal model by column.
+        completed: Those of the completed model.
+    """
+
+    horizon: float
+    nominal: Mapping[str, float]
+    completed: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """How much of the mismatch the completed model leaves, and what it looks like.
+
+    Attributes:
+        share_gone: Share of the squared prediction error above the sensors' floor that is gone, on held-out recordings.
+        times_floor: Error that stays as a multiple of the sensors' floor, by column.
+        matters: Whether it matters for predictions of half a second.
+        horizons: Errors by time since the start of a prediction.
+        forces: On each joint.
+    """
+
+    share_gone: float
+    times_floor: Mapping[str, float]
+    matters: bool
+    horizons: tuple[HorizonErrors, ...]
+    forces: tuple[LeftForce, ...]
+
+
+@dataclass(frozen=True)
 class Candidate:
     """An effect, or several, that was considered.
 
@@ -353,6 +413,7 @@ class Diagnosis:
         seconds: That the diagnosis took.
         combined: Laws that the vocabulary lacks and that explain several of the effects at once as well.
         suspects: What was asked about after the answer was complete, and what these recordings say of it.
+        remainder: What the completed model leaves; None where that was not looked at.
     """
 
     title: str
@@ -377,3 +438,4 @@ class Diagnosis:
     seconds: float
     combined: tuple[Combined, ...] = ()
     suspects: tuple[Suspect, ...] = ()
+    remainder: Remainder | None = None

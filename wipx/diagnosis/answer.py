@@ -11,10 +11,12 @@ from wipx.core.diagnosis import (
     Diagnosis,
     FoundEffect,
     NextExperiment,
+    Remainder,
     Unexplained,
     Verdict,
 )
-from wipx.core.results import Estimate
+from wipx.core.model import Model
+from wipx.core.results import Estimate, FitErrors, Trace
 from wipx.core.words import effect_in_words
 from wipx.diagnosis.combined import combined
 from wipx.diagnosis.curves import law_curve
@@ -29,9 +31,10 @@ from wipx.diagnosis.location import located
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.nested import CONTAINS, simpler
 from wipx.diagnosis.numbers import bounds, estimates, is_wide
+from wipx.diagnosis.remainder import horizon_errors, left_forces
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.selection import Selection
-from wipx.diagnosis.sentence import sentence
+from wipx.diagnosis.sentence import explained_share, sentence
 from wipx.diagnosis.stand_in import curve_of
 from wipx.effects.catalogue import effect_of
 from wipx.sim.simulator import StateFeedback
@@ -45,14 +48,20 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     """Everything a person wants to know."""
     nominal, fit = inquiry.setting.nominal, rest.fit
     repeated = transfer(inquiry.fitter, fit)
-    held_out, traces = judged(inquiry.judge, nominal, repeated.models, inquiry.recordings)
-    fitted, _ = inquiry.judge.compare(nominal, fit.hypothesis.model, inquiry.recordings, held_out=False)
+    judge = inquiry.judge
+    trusted = judge.tuned(nominal, inquiry.recordings)
+    model = replace(fit.hypothesis.model, bandwidths=judge.bandwidths or {})
+    held_out, traces = judged(judge, trusted, repeated.models, inquiry.recordings)
+    fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
     ends = estimates(inquiry.fitter, fit, selection.nominal)
     effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
-    verdict: Verdict = "unexplained" if rest.significant else "mismatch" if effects else "consistent"
-    unexplained = _unexplained(inquiry, rest)
+    matters = not inquiry.is_trusted(fit)
+    left = rest.significant or matters
+    verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
+    unexplained = replace(_unexplained(inquiry, rest), significant=left)
     as_one = () if rest.significant else combined(inquiry, selection, fit)
-    location = located(inquiry.fitter, selection.nominal, fit, effects, unexplained.site)
+    before, after = (inquiry.fitter.seen_by_row(each)[1] for each in (selection.nominal, fit))
+    location = located(inquiry.by_row, before, after, effects, unexplained.site)
     draft = Diagnosis(
         title="",
         source="",
@@ -60,7 +69,7 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
         verdict=verdict,
         sentence="",
         nominal=nominal,
-        model=fit.hypothesis.model,
+        model=model,
         effects=effects,
         corrected=tuple(e for e in ends if e.name in inquiry.setting.uncertainty),
         location=location,
@@ -75,8 +84,23 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
         notes=(),
         seconds=0.0,
         combined=as_one,
+        remainder=_remainder(inquiry, model, held_out, traces, matters=matters),
     )
     return replace(draft, sentence=sentence(draft))
+
+
+def _remainder(
+    inquiry: Inquiry, model: Model, held_out: FitErrors, traces: tuple[Trace, ...], *, matters: bool
+) -> Remainder:
+    """How much stays, and what it looks like."""
+    floors = {name: max(floor, 1e-15) for name, floor in held_out.noise_floor.items()}
+    return Remainder(
+        explained_share(held_out),
+        {name: held_out.completed[name] / floor for name, floor in floors.items()},
+        matters,
+        horizon_errors(traces),
+        left_forces(inquiry.by_row.simulator, inquiry.log, inquiry.judge.noise, model),
+    )
 
 
 def _in_hindsight(candidate: Candidate, fit: Fit) -> Candidate:
@@ -113,7 +137,7 @@ def _effects(
                 inquiry.heldout_gain(repeated, reduced[effect]),
                 probability,
                 gains[effect] / total,
-                law_curve(inquiry.fitter, _taken_out(inquiry, fit, effect), fit, effect, shapes),
+                law_curve(inquiry.by_row, _taken_out(inquiry, fit, effect), fit, effect, shapes),
             )
         )
     return tuple(found)
@@ -123,13 +147,13 @@ def _taken_out(inquiry: Inquiry, fit: Fit, effect: str) -> Fit:
     """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
     rest = tuple(e for e in fit.effects if e != effect)
     hypothesis = Hypothesis.of(inquiry.setting_of(fit), rest, fit.hypothesis.values)
-    found = inquiry.fitter.fit(hypothesis, fit.levels, steps=0)
+    found = inquiry.by_row.fit(hypothesis, inquiry.fitter.seen_by_row(fit)[1].levels, steps=0)
     return replace(found, jacobian=found.jacobian[:, :0])
 
 
 def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
     """Effects that could stand in the place of one, the closest first, and the probability of its name."""
-    overstated = inflation(fit, inquiry.log, fit.hypothesis.parameters_of(effect))
+    overstated = inflation(fit, fit.hypothesis.parameters_of(effect))
     rivals, weights = [], []
     rest = set(fit.effects) - {effect}
     base = inquiry.reduced(selection, fit, effect)
@@ -237,7 +261,9 @@ def proposed(
     if not rivals and not weak:
         return None
     questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
-    question = Question(f"Open: {', '.join(questions)}.", tuple(rivals), weak)
+    seen = tuple(inquiry.fitter.seen_by_row(rival)[1] for rival in rivals)
+    question = Question(f"Open: {', '.join(questions)}.", seen, weak)
     closed, rate = feedback if feedback is not None else (None, inquiry.recordings[0].rate)
-    simulator = inquiry.fitter.follower.simulator
-    return next_experiment(question, fit, inquiry.setting, inquiry.log, simulator, closed, rate, rng)
+    simulator = inquiry.by_row.simulator
+    answered_by_row = inquiry.fitter.seen_by_row(fit)[1]
+    return next_experiment(question, answered_by_row, inquiry.setting, inquiry.log, simulator, closed, rate, rng)

@@ -9,9 +9,9 @@ import numpy as np
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
 from wipx.core.recording import Recording
+from wipx.diagnosis.ahead import found
 from wipx.diagnosis.answer import answered, proposed
 from wipx.diagnosis.caveats import caveats
-from wipx.diagnosis.decision import decided
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.inquiry import Inquiry
 from wipx.diagnosis.sanity import check_plausible
@@ -93,7 +93,7 @@ def diagnose(
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
     inquiry = Inquiry.of(halves, setting, simulator)
     watcher("noise of the nominal model", 0.02)
-    fitter = inquiry.fitter
+    fitter = inquiry.by_row
     nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), inquiry.first_levels))
     selection = Selection(fitter, setting, nominal, inquiry.transfers)
     watcher("looking for missing effects", 0.1)
@@ -102,10 +102,11 @@ def diagnose(
         check_plausible(fitter, setting, selection.nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     chosen = selection.run()
-    watcher("what is left over", 0.6)
-    rest, shapes = decided(inquiry, selection, chosen)
+    watcher("what is left over", 0.5)
+    end = found(inquiry, selection, chosen)
+    inquiry, selection, rest = end.inquiry, end.selection, end.rest
     watcher("held-out recordings", 0.75)
-    answer = answered(inquiry, selection, rest, shapes)
+    answer = answered(inquiry, selection, rest, end.shapes)
     watcher("next experiment", 0.9)
     proposal = proposed(inquiry, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
     answer = replace(answer, next_experiment=proposal)

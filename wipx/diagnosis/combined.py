@@ -4,13 +4,11 @@ Both are in the vocabulary, so that recordings which show the one show the other
 say so.
 """
 
-from dataclasses import replace
-
 from wipx.core.diagnosis import Combined
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
-from wipx.diagnosis.selection import LOUDER, Selection
+from wipx.diagnosis.selection import Selection
 
 CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a constant force on a joint
 TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
@@ -26,8 +24,7 @@ def combined(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Combined
             rest = tuple(effect for effect in fit.effects if effect not in (friction, constant))
             start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
             hypothesis = Hypothesis.of(inquiry.setting, (*rest, name), start)
-            louder = replace(fit.levels, force=LOUDER * fit.levels.force)
-            other = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, louder))
+            other = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, inquiry.fitter.loosened(fit)))
             lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
             if lead > -TOLD_APART:
                 values = other.hypothesis.values

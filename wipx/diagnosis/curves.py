@@ -6,7 +6,8 @@ import numpy as np
 
 from wipx.core.diagnosis import Curve
 from wipx.core.words import effect_in_words
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.leftover import Shape, leftovers
 from wipx.diagnosis.stand_in import process_mean
 
@@ -25,9 +26,9 @@ OVER_COMMAND = ("gain", "dead_zone", "saturation", "offset")
 OVER_COORDINATE = ("spring", "ripple", "rail_tilt")
 
 
-def law_curve(fitter: Fitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
+def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
     """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
-    plant = fitter.follower.log.plant
+    plant = fitter.log.plant
     site, _, kind = effect.partition("/")
     joint = site if site in plant.joints else plant.actuated[0]
     signal = _abscissa(kind, plant.joints.index(joint), fitter)
@@ -54,8 +55,8 @@ def law_curve(fitter: Fitter, reduced: Fit, completed: Fit, effect: str, shapes:
     )
 
 
-def _abscissa(kind: str, joint: int, fitter: Fitter) -> str | None:
-    plant = fitter.follower.log.plant
+def _abscissa(kind: str, joint: int, fitter: InnovationFitter) -> str | None:
+    plant = fitter.log.plant
     if kind in OVER_RATE:
         return plant.rates[joint]
     if kind in OVER_COORDINATE:

@@ -8,15 +8,15 @@ from scipy.special import chdtrc
 
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis import rough
-from wipx.diagnosis.fitting import Fit
-from wipx.diagnosis.heldout import Transfer, row_likelihoods, transfer
+from wipx.diagnosis.fitting import LEAST_GAIN, Fit
+from wipx.diagnosis.heldout import Transfer, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import TOLERATED, Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers, shapes_of
 from wipx.diagnosis.nested import richer
 from wipx.diagnosis.numbers import deviations
 from wipx.diagnosis.screening import prospects
-from wipx.diagnosis.selection import LEAST_GAIN, Selection
+from wipx.diagnosis.selection import Selection
 from wipx.diagnosis.sentence import FAR_OFF, times_the_floor
 from wipx.diagnosis.stand_in import with_curve
 from wipx.effects.catalogue import effect_of
@@ -66,7 +66,7 @@ def decided(inquiry: Inquiry, selection: Selection, chosen: Fit) -> tuple[Rest, 
     """
     told = len(selection.considered)
     kept = confirmed(inquiry, selection, chosen)
-    shapes = shapes_of(inquiry.fitter, kept)
+    shapes = shapes_of(inquiry.by_row, kept)
     rest = remaining(inquiry, selection, kept, shapes)
     if not rest.significant or len(kept.effects) == len(chosen.effects):
         return rest, shapes
@@ -101,7 +101,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
         change = predicted - np.concatenate(inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings))
-        known = row_likelihoods(inquiry.fitter, reduced, reduced.white).sum(axis=1)
+        known = inquiry.fitter.by_recording(reduced, reduced.white)
         # An effect that gains much and does not transfer points to something else that is missing.
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
             reason = "changes no prediction to speak of"
@@ -164,9 +164,7 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
     other = _other_law(inquiry, selection, fit, least["force"])
     if other is not None:
         return other
-    found = leftovers(inquiry.fitter, fit, shapes)
-    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
-    left = _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT)
+    left, p_value = significant_leftovers(inquiry, selection, fit, shapes)
     if not left and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
     strongest = max(left, key=lambda leftover: leftover.gain) if left else None
@@ -181,7 +179,7 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
         named = fit if named is None else _without_superfluous(inquiry, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     widest = max(forces, key=lambda leftover: leftover.gain)
-    stood_in, spread = with_curve(inquiry.fitter, inquiry.setting, fit, widest)
+    stood_in, spread = with_curve(inquiry.by_row, inquiry.setting, fit, widest)
     if named is not None and named.log_likelihood > stood_in.log_likelihood:
         named = _without_superfluous(inquiry, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
@@ -189,6 +187,16 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
         if selection.evidence(inquiry.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
             return remaining(inquiry, selection, selection.without(fit, effect), shapes)
     return Rest(stood_in, widest, p_value, True, resembles, spread)
+
+
+def significant_leftovers(
+    inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]
+) -> tuple[list[Leftover], float]:
+    """Leftovers of a fit that are no chance, and large enough; and the p value that there is none."""
+    found = leftovers(inquiry.by_row, fit, shapes)
+    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
+    least = _least_gains(inquiry, selection, fit)
+    return _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT), p_value
 
 
 def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, float]:
@@ -248,8 +256,7 @@ def _other_law(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -
 
 def _is_far_off(inquiry: Inquiry, fit: Fit) -> bool:
     """Whether predictions are much worse than sensor noise makes them."""
-    errors, _ = inquiry.judge.compare(inquiry.setting.nominal, fit.hypothesis.model, inquiry.recordings, held_out=False)
-    return times_the_floor(errors) > FAR_OFF
+    return times_the_floor(inquiry.errors(fit)) > FAR_OFF
 
 
 def _without_superfluous(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.core.diagnosis import Experiment, NextExperiment
-from wipx.diagnosis.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit, Fitter
+from wipx.diagnosis.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.menu import Reach, how, menu, prescribed
 from wipx.diagnosis.robust import covariance, inflation
@@ -79,7 +80,7 @@ def next_experiment(
         trial = None if excitation.mass and asked.has_payload_event else bench.tried(excitation, rng)
         if trial is not None:
             run = Log.of((trial.recording,), log.plant).reporting_nothing(log)
-            fitter = Fitter(Follower.of(simulator, run, setting.nominal))
+            fitter = InnovationFitter(Follower.of(simulator, run, setting.nominal))
             trials.append(trial)
             separations.append(asked.separations(fitter, trial.excitation.mass))
     if not trials or not asked.count:
@@ -122,7 +123,7 @@ class _Asked:
         names = fit.hypothesis.space.names
         numbers = tuple(names.index(name) for name in question.parameters)
         everything = list(range(len(names)))
-        return cls(fit, question.rivals[:MOST_RIVALS], numbers, covariance(fit, log), inflation(fit, log, everything))
+        return cls(fit, question.rivals[:MOST_RIVALS], numbers, covariance(fit), inflation(fit, everything))
 
     @property
     def count(self) -> int:
@@ -134,7 +135,7 @@ class _Asked:
         """Whether a known mass cannot be told to the simulator beside what the models have."""
         return any(EVENT in fit.hypothesis.model.effects for fit in (self.fit, *self.rivals))
 
-    def separations(self, fitter: Fitter, mass: float) -> np.ndarray:
+    def separations(self, fitter: InnovationFitter, mass: float) -> np.ndarray:
         """What a simulated run would add, shape (count,) [standard deviations].
 
         Args:
@@ -172,7 +173,7 @@ class _View:
         judge: The completed model with noise and colour of the recordings so far.
     """
 
-    fitter: Fitter
+    fitter: InnovationFitter
     judge: Fit
 
     def distance(self, rival: Hypothesis, information: np.ndarray) -> float:
@@ -196,7 +197,7 @@ class _View:
             if costs[best] >= cost:
                 break
             cube, cost = trials[best], float(costs[best])
-        log = self.fitter.follower.log
+        log = self.fitter.log
         values = int(log.counted.sum()) * log.signals
         return values * float(np.log1p(cost / values))
 

@@ -1,32 +1,48 @@
-"""Maximum likelihood: the parameters and the noise with which a hypothesis explains recordings best.
+"""Maximum likelihood: the parameters with which a hypothesis explains recordings best.
 
-Prediction-error method (Ljung 1999, System Identification, ch. 7): Levenberg-Marquardt steps on white
-innovations with observer and colour held fixed, in turn with a search over the noise levels.
+Prediction-error method (Ljung 1999, System Identification, ch. 7): Levenberg-Marquardt steps on white errors, with
+what makes them white held fixed. What the errors are is left to the evidence that is counted: `innovations` are those
+of predictions of one row, `forecasts` those of predictions of up to half a second.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
-from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.observer import Gains, NoiseLevels
-from wipx.diagnosis.whiteness import Colour, colour_of, whitened
+from wipx.diagnosis.log import Log
+from wipx.sim.analytic import AnalyticSimulator
+
+if TYPE_CHECKING:
+    from wipx.diagnosis.innovations import InnovationFitter
 
 FIRST_STEP = 1e-4  # of the search interval, for the first slopes
 LARGEST_STEP = 0.02
 SECANT = 0.3  # standard deviations over which later slopes are taken
 DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
-LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
-LEVEL_RANGE = 14.0  # of the same, about the first guess
-LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
-THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
-SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
+LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
 POLISHED = 0.5  # nats at which alternating ends
+
+
+class Noise(Protocol):
+    """What makes errors white."""
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the errors that it was fitted to, up to a constant that all hypotheses share."""
+        ...
+
+    @property
+    def reported(self) -> float:
+        """The part of it that is the reported forces'."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -35,18 +51,20 @@ class Fit:
 
     Attributes:
         hypothesis: With its best values.
-        levels: Noise levels.
-        colour: Of its innovations.
-        white: White innovations, shape (R, m, K + 1); zero at rows that do not count.
-        rows: Number of rows that count.
-        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (R m (K + 1) + priors, D).
+        levels: What was held fixed: noise levels, or where predictions start.
+        noise: Of its errors.
+        white: Errors made white; of innovations, shape (R, m, K + 1), zero at rows that do not count.
+        blocks: Number of the stretch of time to which each white error belongs, shape of `white`.
+        rows: Number of errors that count as independent.
+        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N + priors, D).
         log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
     """
 
     hypothesis: Hypothesis
-    levels: NoiseLevels
-    colour: Colour
+    levels: Any
+    noise: Any
     white: np.ndarray
+    blocks: np.ndarray
     rows: int
     jacobian: np.ndarray
     log_likelihood: float
@@ -54,7 +72,7 @@ class Fit:
     @property
     def motion_likelihood(self) -> float:
         """Log-likelihood without that of forces which the drives report."""
-        return self.log_likelihood - self.colour.reported
+        return self.log_likelihood - self.noise.reported
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -79,18 +97,111 @@ class Fit:
         return self.jacobian.T @ self.jacobian
 
 
-@dataclass(frozen=True)
-class Fitter:
-    """Fits hypotheses to the recordings of a follower."""
+class Fitter(ABC):
+    """Fits hypotheses to recordings, by one kind of evidence.
 
-    follower: Follower
+    Attributes:
+        considered: Effects that are fitted in each step of a search, at most.
+        promising: Share of the best expected gain below which an effect is not fitted.
+        worthless: Expected gain below which none is [nats].
+        steps: Levenberg-Marquardt steps from each start of an effect.
+        unproven: Effects that need not transfer to held-out recordings, at most.
+        richer_by: Lead that a rich law must have over the simple one that it contains [nats].
+    """
 
-    def fit(self, hypothesis: Hypothesis, levels: NoiseLevels, *, steps: int = 6) -> Fit:
-        """The best values at given noise levels, from the hypothesis' own values on.
+    considered: ClassVar[int]
+    promising: ClassVar[float]
+    worthless: ClassVar[float]
+    steps: ClassVar[int]
+    unproven: ClassVar[int]
+    richer_by: ClassVar[float]
+
+    @abstractmethod
+    def looks_for(self, name: str, effect: Effect) -> bool:
+        """Whether an effect "site/kind" is one of those that may be named by this evidence."""
+
+    @property
+    @abstractmethod
+    def log(self) -> Log:
+        """The recordings."""
+
+    @property
+    @abstractmethod
+    def simulator(self) -> AnalyticSimulator:
+        """The engine."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> int:
+        """Number of errors that count as independent."""
+
+    @property
+    @abstractmethod
+    def blocks(self) -> np.ndarray:
+        """Number of the stretch of time to which each white error belongs, shape of `Fit.white`."""
+
+    @abstractmethod
+    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+        """Values, and what is else held fixed, in turn until neither gains more."""
+
+    @abstractmethod
+    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+        """Evidence that what a fit has beside a smaller one must gain beyond its penalty [nats].
+
+        Args:
+            smaller: The smaller fit.
+            larger: The larger fit.
+            explained: What the smaller one explains already [nats].
+        """
+
+    @abstractmethod
+    def loosened(self, fit: Fit) -> Any:
+        """Levels from which a fit sees less of a misfit that it got stuck in."""
+
+    @abstractmethod
+    def spread_for(self, model: Model, levels: Any) -> Any:
+        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
+
+    @abstractmethod
+    def refined(self) -> Self:
+        """The same with half the step of the simulator."""
+
+    @abstractmethod
+    def without(self, recording: int) -> Self:
+        """The same with a recording that does not count."""
+
+    @abstractmethod
+    def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """A fit as its innovations show it, and what fits by innovations."""
+
+    @abstractmethod
+    def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
+        """Log-likelihood of each recording, shape (R,), for white errors of the shape of `Fit.white`."""
+
+    @abstractmethod
+    def errors_of(self, batch: ModelBatch, levels: Any, model: Model) -> np.ndarray:
+        """Errors of P models, shape (P, ...).
+
+        Args:
+            batch: The models.
+            levels: What is held fixed.
+            model: Whose sensors the errors are seen with.
+        """
+
+    @abstractmethod
+    def noise_of(self, errors: np.ndarray, levels: Any, model: Model) -> Sequence[Noise]:
+        """What makes the errors of each of P models white; arguments as `errors_of` has them."""
+
+    @abstractmethod
+    def whitened(self, errors: np.ndarray, noise: Noise) -> np.ndarray:
+        """Errors (P, ...) made white, of the shape (P, *white)."""
+
+    def fit(self, hypothesis: Hypothesis, levels: Any, *, steps: int = 6) -> Fit:
+        """The best values at given levels, from the hypothesis' own values on.
 
         Args:
             hypothesis: Where to start.
-            levels: Noise.
+            levels: What is held fixed.
             steps: Levenberg-Marquardt steps at most.
         """
         here = self._started(hypothesis, levels)
@@ -105,141 +216,58 @@ class Fitter:
                 break
         return here
 
-    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
-        """Noise levels and values in turn until neither gains more."""
-        for _ in range(rounds):
-            before = fit.log_likelihood
-            fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
-            if fit.log_likelihood - before < POLISHED:
-                break
-        return fit
-
-    def levels_of(self, fit: Fit) -> NoiseLevels:
-        """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
-
-        The levels' common factor does not matter: the first sensor's level is kept.
-
-        Args:
-            fit: Where to start.
-        """
-        fixed = len(fit.levels.force)
-        levels = self.spread_for(fit.hypothesis.model, fit.levels)
-        search = _LevelSearch(self, fit.hypothesis, levels)
-        centre = best = _logarithms(levels)
-        free = [i for i in range(len(best)) if i != fixed]
-        for step in LEVEL_STEPS:
-            move = np.zeros_like(best)
-            for _ in range(12):
-                trials = [best + sign * step * np.eye(len(best))[i] for i in free for sign in (-1.0, 1.0)]
-                if np.count_nonzero(move) > 1:
-                    trials.append(best + move)
-                trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
-                likelihoods = search.likelihoods([best, *trials])
-                gains = likelihoods[1:] - likelihoods[0]
-                move = _joined(gains[: 2 * len(free)], step, free, len(best))
-                if gains.max() <= LEVEL_GAIN:
-                    break
-                best = trials[int(gains.argmax())]
-        return _levels(best, levels)
-
-    def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
-        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
-        kinds = {name.partition("/")[2] for name in model.effects}
-        matters = self.follower.log.has_means and not kinds.isdisjoint(THRESHOLDS)
-        if matters == (levels.spread > 0.0):
-            return levels
-        return replace(levels, spread=1.0 if matters else 0.0)
-
-    def _with_best_spread(self, fit: Fit) -> Fit:
-        """A fit with the spread of single commands that suits it best, where it has one.
-
-        Thresholds are tied to the spread, so the values follow it at every try.
-        """
-        for factor in (SPREAD, 1.0 / SPREAD) if fit.levels.spread > 0.0 else ():
-            change = factor
-            while True:
-                there = self._at_spread(fit, change)
-                if there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
-                    fit, change = there, change**2
-                elif change != factor:
-                    change = factor
-                else:
-                    break
-        return fit
-
-    def _at_spread(self, fit: Fit, change: float) -> Fit:
-        levels = replace(fit.levels, spread=change * fit.levels.spread)
-        return self.fit(fit.hypothesis, levels, steps=3)
-
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
-        """White innovations of other models, with observer and colour of a fit, shape (P, R m (K + 1))."""
-        gains = self.follower.gains(fit.levels, fit.hypothesis.model)
-        innovations = self._followed(batch, gains, fit.levels)
-        return whitened(innovations, fit.colour, self.follower.log).reshape(batch.size, -1)
+        """White errors of other models, with levels and noise of a fit, shape (P, N)."""
+        errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)
+        return self.whitened(errors, fit.noise).reshape(batch.size, -1)
 
-    def _started(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
+    def likeliest(self, hypotheses: Sequence[Hypothesis], levels: Any, count: int) -> list[Hypothesis]:
+        """The likeliest few of hypotheses of the same effects, as they are."""
+        return [hypotheses[i] for i in np.argsort(-self.likelihoods_of(hypotheses, levels))[:count]]
+
+    def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: Any) -> np.ndarray:
+        """Log-likelihoods of hypotheses of the same effects, as they are."""
+        cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
+        space, model = hypotheses[0].space, hypotheses[0].model
+        noise = self.noise_of(self.errors_of(space.batch(cubes), levels, model), levels, model)
+        return np.array([each.log_likelihood for each in noise]) - 0.5 * np.sum(
+            space.prior_residuals(cubes) ** 2, axis=1
+        )
+
+    def _started(self, hypothesis: Hypothesis, levels: Any) -> Fit:
         """The values of a hypothesis as they are, with first slopes."""
         cubes = _around(hypothesis.cube, np.full(len(hypothesis.cube), FIRST_STEP))
-        innovations = self._innovations(hypothesis, cubes, levels)
-        return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], innovations[:1]), cubes, innovations)
+        errors = self._errors(hypothesis, cubes, levels)
+        return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], errors[:1]), cubes, errors)
 
     def _resloped(self, fit: Fit, size: np.ndarray) -> Fit:
         """A fit with slopes over steps of the position in the cube, shape (D,)."""
         cubes = _around(fit.hypothesis.cube, size)
-        return self._with_slopes(fit, cubes, self._innovations(fit.hypothesis, cubes, fit.levels))
+        return self._with_slopes(fit, cubes, self._errors(fit.hypothesis, cubes, fit.levels))
 
-    def _with_slopes(self, fit: Fit, cubes: np.ndarray, innovations: np.ndarray) -> Fit:
-        """A fit with slopes of white innovations and priors, from the positions around it and their innovations."""
-        white = whitened(innovations, fit.colour, self.follower.log).reshape(len(cubes), -1)
+    def _with_slopes(self, fit: Fit, cubes: np.ndarray, errors: np.ndarray) -> Fit:
+        """A fit with slopes of white errors and priors, from the positions around it and their errors."""
+        white = self.whitened(errors, fit.noise).reshape(len(cubes), -1)
         rows = np.concatenate([white, fit.hypothesis.space.prior_residuals(cubes)], axis=1)
         return replace(fit, jacobian=((rows[1:] - rows[0]) / np.diag(cubes[1:] - cubes[0])[:, None]).T)
 
     def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:
         """The likeliest of several positions in the cube, without slopes."""
-        innovations = self._innovations(fit.hypothesis, cubes, fit.levels)
-        return self._likeliest(fit.hypothesis, fit.levels, cubes, innovations)
+        errors = self._errors(fit.hypothesis, cubes, fit.levels)
+        return self._likeliest(fit.hypothesis, fit.levels, cubes, errors)
 
-    def _likeliest(
-        self, hypothesis: Hypothesis, levels: NoiseLevels, cubes: np.ndarray, innovations: np.ndarray
-    ) -> Fit:
-        """The likeliest of several positions in the cube by their innovations (P, R, m, K + 1), without slopes."""
-        log = self.follower.log
-        colours = [colour_of(each, log) for each in innovations]
+    def _errors(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: Any) -> np.ndarray:
+        return self.errors_of(hypothesis.space.batch(cubes), levels, hypothesis.model)
+
+    def _likeliest(self, hypothesis: Hypothesis, levels: Any, cubes: np.ndarray, errors: np.ndarray) -> Fit:
+        """The likeliest of several positions in the cube by their errors (P, ...), without slopes."""
+        noise = self.noise_of(errors, levels, hypothesis.model)
         priors = hypothesis.space.prior_residuals(cubes)
-        scale = _log_determinant(self.follower.gains(levels, hypothesis.model).whitening, log)
-        likelihoods = [scale + c.log_likelihood - 0.5 * float(p @ p) for c, p in zip(colours, priors, strict=True)]
+        likelihoods = [each.log_likelihood - 0.5 * float(p @ p) for each, p in zip(noise, priors, strict=True)]
         i = int(np.argmax(likelihoods))
-        white = whitened(innovations[i : i + 1], colours[i], log)[0]
+        white = self.whitened(errors[i : i + 1], noise[i])[0]
         slopes = np.zeros((white.size + priors.shape[1], cubes.shape[1]))
-        best = hypothesis.at(cubes[i])
-        return Fit(best, levels, colours[i], white, int(log.counted.sum()), slopes, likelihoods[i])
-
-    def likeliest(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels, count: int) -> list[Hypothesis]:
-        """The likeliest few of hypotheses of the same effects, as they are."""
-        return [hypotheses[i] for i in np.argsort(-self.likelihoods_of(hypotheses, levels))[:count]]
-
-    def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
-        """Log-likelihoods of hypotheses of the same effects, as they are."""
-        cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
-        gains = [self.follower.gains(levels, hypothesis.model) for hypothesis in hypotheses]
-        alike = np.array([next(i for i, other in enumerate(gains) if other is own) for own in gains])
-        different, group = np.unique(alike, return_inverse=True)
-        observers = tuple(gains[i] for i in different)
-        batch = hypotheses[0].space.batch(cubes)
-        innovations = self.follower.innovations(batch, observers, group, np.full(batch.size, levels.spread))
-        scales = [_log_determinant(observer.whitening, self.follower.log) for observer in observers]
-        priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
-        log = self.follower.log
-        likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
-        return likelihoods + np.array(scales)[group]
-
-    def _innovations(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: NoiseLevels) -> np.ndarray:
-        gains = self.follower.gains(levels, hypothesis.model)
-        return self._followed(hypothesis.space.batch(cubes), gains, levels)
-
-    def _followed(self, batch: ModelBatch, gains: Gains, levels: NoiseLevels) -> np.ndarray:
-        same = np.zeros(batch.size, dtype=np.int64)
-        return self.follower.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
+        return Fit(hypothesis.at(cubes[i]), levels, noise[i], white, self.blocks, self.rows, slopes, likelihoods[i])
 
     def _proposals(self, fit: Fit) -> np.ndarray:
         """Positions to try next, one for each damping, within the cube."""
@@ -256,70 +284,7 @@ class Fitter:
             proposals[i, free] -= step
         return np.clip(proposals, 0.0, 1.0)
 
-    def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[float]:
-        """Log-likelihoods of one model with several noise levels."""
-        log = self.follower.log
-        gains = self.follower.gains_of(levels, hypothesis.model)
-        count = len(levels)
-        batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
-        spread = np.array([level.spread for level in levels])
-        innovations = self.follower.innovations(batch, gains, np.arange(count), spread)
-        priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
-        return [
-            _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
-            for g, each in zip(gains, innovations, strict=True)
-        ]
-
-
-@dataclass(frozen=True)
-class _LevelSearch:
-    """Likelihoods of one model by the logarithms of noise levels, each asked for once."""
-
-    fitter: Fitter
-    hypothesis: Hypothesis
-    levels: NoiseLevels
-    known: dict[tuple[float, ...], float] = field(default_factory=dict)
-
-    def likelihoods(self, points: Sequence[np.ndarray]) -> np.ndarray:
-        """Log-likelihoods of points; those that are not known yet are simulated at once."""
-        fresh = {_key(point): point for point in points if _key(point) not in self.known}
-        if fresh:
-            levels = [_levels(point, self.levels) for point in fresh.values()]
-            self.known.update(zip(fresh, self.fitter.likelihoods(self.hypothesis, levels), strict=True))
-        return np.array([self.known[_key(point)] for point in points])
-
-
-def _key(point: np.ndarray) -> tuple[float, ...]:
-    """Logarithms of levels, free of rounding."""
-    return tuple(np.round(point, 6).tolist())
-
 
 def _around(cube: np.ndarray, size: np.ndarray) -> np.ndarray:
     """A position in the cube, and a step from it along each axis away from the nearer bound, shape (D + 1, D)."""
     return np.concatenate([cube[None], cube + np.diag(np.where(cube > 0.5, -size, size))])
-
-
-def _logarithms(levels: NoiseLevels) -> np.ndarray:
-    return np.log(np.concatenate([levels.force, levels.sensor]))
-
-
-def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
-    values = np.exp(logarithms)
-    joints = len(like.force)
-    return NoiseLevels(values[:joints], values[joints:], like.spread)
-
-
-def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.ndarray:
-    """All single moves that gained, made at once; gains in pairs (-, +) for each free level."""
-    move = np.zeros(count)
-    for i, index in enumerate(free):
-        down, up = gains[2 * i], gains[2 * i + 1]
-        if max(down, up) > 0.0:
-            move[index] = step if up > down else -step
-    return move
-
-
-def _log_determinant(whitening: np.ndarray, log) -> float:
-    """Sum of log det of the whitening over the rows that count."""
-    diagonal = np.einsum("krcc->krc", whitening)[log.counted]
-    return float(np.log(diagonal.prod(axis=1)).sum())

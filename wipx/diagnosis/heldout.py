@@ -1,6 +1,6 @@
 """Does the answer transfer: every recording judged by a model that was fitted to the others."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,27 +28,15 @@ class Transfer:
 
 def transfer(fitter: Fitter, fit: Fit) -> Transfer:
     """Leave out each recording; one alone is judged by the model that was fitted to it."""
-    log = fitter.follower.log
-    count = len(log.recordings)
+    count = len(fitter.log.recordings)
     cubes = [fit.hypothesis.cube] * count
     if count > 1 and len(fit.hypothesis.cube):
-        cubes = [_without(fitter, fit, r) for r in range(count)]
+        cubes = [fitter.without(r).fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube for r in range(count)]
     space = fit.hypothesis.space
     batch = space.batch(np.stack(cubes))
     white = fitter.white_of(fit, batch).reshape(count, *fit.white.shape)
-    own = np.stack([white[r, r] for r in range(count)])
-    models = tuple(fit.hypothesis.at(cube).model for cube in cubes)
-    return Transfer(models, row_likelihoods(fitter, fit, own).sum(axis=1))
-
-
-def row_likelihoods(fitter: Fitter, fit: Fit, white: np.ndarray) -> np.ndarray:
-    """Log-likelihood of every row, shape (R, K + 1), for white innovations (R, m, K + 1) of a fit's observer."""
-    log = fitter.follower.log
-    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
-    diagonal = np.einsum("krcc->rkc", gains.whitening)
-    scale = np.where(log.counted.T, np.log(np.where(diagonal > 0.0, diagonal, 1.0)).sum(axis=2), 0.0)
-    scale += log.counted.T * np.log(np.diag(fit.colour.whitening)).sum()
-    return scale - 0.5 * np.sum(white**2, axis=1)
+    likelihoods = np.array([fitter.by_recording(fit, each)[r] for r, each in enumerate(white)])
+    return Transfer(tuple(fit.hypothesis.at(cube).model for cube in cubes), likelihoods)
 
 
 def judged(
@@ -76,10 +64,3 @@ def joined(parts: list[FitErrors]) -> FitErrors:
         }
 
     return FitErrors(parts[0].horizon, int(weights.sum()), mean("nominal"), mean("completed"), mean("noise_floor"))
-
-
-def _without(fitter: Fitter, fit: Fit, recording: int) -> np.ndarray:
-    """Best position in the cube without one recording, shape (D,)."""
-    follower = fitter.follower
-    others = Fitter(replace(follower, log=replace(follower.log, left_out=recording)))
-    return others.fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube

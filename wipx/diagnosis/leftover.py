@@ -12,7 +12,8 @@ import numpy as np
 from scipy.special import chdtrc
 
 from wipx.core.plant import Plant
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.response import direction, motion_of, response
 from wipx.diagnosis.robust import stretches, sums_over
@@ -61,9 +62,9 @@ class Leftover:
     slopes: np.ndarray
 
 
-def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
+def shapes_of(fitter: InnovationFitter, fit: Fit) -> list[Shape]:
     """All families of forces that are looked at, over the motion as a fit sees it."""
-    log = fitter.follower.log
+    log = fitter.log
     signals = motion_of(fitter, fit)
     found = []
     for joint, site in enumerate(log.plant.joints):
@@ -87,19 +88,19 @@ def shapes_of(fitter: Fitter, fit: Fit) -> list[Shape]:
     return found
 
 
-def leftovers(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+def leftovers(fitter: InnovationFitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
     """What each family of forces would add to a fit, the most significant first."""
     white = fit.white.ravel()
     own = fit.jacobian[: white.size]
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
     left = white - basis @ (basis.T @ white)
-    labels = np.repeat(stretches(fitter.follower.log)[:, None], fit.white.shape[1], axis=1).ravel()
+    labels = np.repeat(stretches(fitter.log)[:, None], fit.white.shape[1], axis=1).ravel()
     found = [_tested(fitter, fit, shape, basis, left, labels) for shape in shapes]
     return sorted(found, key=lambda leftover: leftover.p_value)
 
 
 def _tested(
-    fitter: Fitter, fit: Fit, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
+    fitter: InnovationFitter, fit: Fit, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
 ) -> Leftover:
     slopes = response(fitter, fit, shape.joint, shape.columns)
     slopes = slopes - basis @ (basis.T @ slopes)

@@ -6,7 +6,8 @@ missing under each of many limits is enough to compare them all; the screening t
 
 import numpy as np
 
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.places import left_of
 from wipx.diagnosis.response import FAST, motion_of, response
 
@@ -17,7 +18,7 @@ SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of th
 ALIKE = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 
-def saturations(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     """Likely largest forces [N or N m], best first, shape (up to GUESSES, 1).
 
     Args:
@@ -28,7 +29,7 @@ def saturations(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     return _likely(fitter, fit, basis, np.array([np.inf]))[:, :1]
 
 
-def speed_limits(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES, 2).
 
     Args:
@@ -39,8 +40,8 @@ def speed_limits(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     return _likely(fitter, fit, basis, SPEEDS)
 
 
-def _likely(fitter: Fitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    log = fitter.follower.log
+def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    log = fitter.log
     plant = log.plant
     motion = motion_of(fitter, fit)
     joints = [plant.joints.index(site) for site in plant.actuated]

@@ -11,7 +11,8 @@ import numpy as np
 from wipx.core.diagnosis import ErrorMap, FoundEffect, Location, Period, Region
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.response import motion_of
 
@@ -21,14 +22,14 @@ CONCENTRATED = 0.6  # share of the excess from which an interval is told
 FEW_ROWS = 0.3  # share of the rows up to which it is one
 
 
-def excess_of(fitter: Fitter, nominal: Fit, completed: Fit) -> np.ndarray:
+def excess_of(fitter: InnovationFitter, nominal: Fit, completed: Fit) -> np.ndarray:
     """By how many nats every row becomes likelier, shape (K + 1, R); zero where rows do not count."""
     white = fitter.white_of(nominal, ModelBatch(completed.hypothesis.model))[0].reshape(nominal.white.shape)
     return 0.5 * np.sum(nominal.white**2 - white**2, axis=1).T
 
 
 def located(
-    fitter: Fitter, nominal: Fit, completed: Fit, effects: tuple[FoundEffect, ...], rest: str | None
+    fitter: InnovationFitter, nominal: Fit, completed: Fit, effects: tuple[FoundEffect, ...], rest: str | None
 ) -> Location:
     """Where the mismatch between nominal and completed model is.
 
@@ -42,7 +43,7 @@ def located(
     if not effects and rest is None:
         return Location({}, (), (), None)
     excess = excess_of(fitter, nominal, completed)
-    log = fitter.follower.log
+    log = fitter.log
     signals = motion_of(fitter, nominal)
     regions = _named_regions(effects, signals, excess, log) or _found_regions(signals, excess, log)
     return Location(_sites(effects, rest), regions, _periods(effects, excess, log), _map(log, signals, excess))

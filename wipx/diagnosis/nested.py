@@ -7,7 +7,7 @@ from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.robust import covariance
 from wipx.effects.catalogue import effect_of, vocabulary
-from wipx.identify.noise import quantisation
+from wipx.identify.noise import quantisation, sensor_noise
 
 CONTAINS = {  # rich law: the simple one that it can always imitate
     "stribeck": "coulomb",
@@ -100,7 +100,7 @@ def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:
     site, _, kind = effect.partition("/")
     value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
     if kind == "presliding":
-        visible = INVISIBLE * _resolution(site, fit, log)
+        visible = INVISIBLE * _resolution(site, log)
         return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
     if kind == "stribeck":
         return "coulomb" if not _peak_is_certain(effect, fit, log) else None
@@ -115,10 +115,10 @@ def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:
     return None
 
 
-def _resolution(site: str, fit: Fit, log: Log) -> float:
+def _resolution(site: str, log: Log) -> float:
     joint = log.plant.joints.index(site)
     series = [r[log.plant.coordinates[joint]] for r in log.recordings]
-    return max(quantisation(series), float(fit.levels.sensor[joint]))
+    return max(quantisation(series), float(sensor_noise(log.recordings, log.plant)[joint]))
 
 
 def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
@@ -129,7 +129,7 @@ def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
     slope = np.zeros(len(cube))
     slope[[static, level]] = size[static], -size[level]
     peak = float(slope @ cube)
-    return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit, log) @ slope))
+    return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit) @ slope))
 
 
 def _top_speed(log: Log) -> float:

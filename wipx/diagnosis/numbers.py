@@ -53,7 +53,7 @@ def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
         return np.zeros(0)
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * _explained(fit, nominal))
-    chance = wider * np.sqrt(np.diag(covariance(fit, fitter.follower.log)))
+    chance = wider * np.sqrt(np.diag(covariance(fit)))
     doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
     return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
 
@@ -97,9 +97,7 @@ def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
     """
     if not len(fit.hypothesis.cube):
         return np.zeros(0)
-    follower = fitter.follower
-    finer = Fitter(replace(follower, simulator=replace(follower.simulator, step=0.5 * follower.simulator.step)))
-    change = finer.white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
+    change = fitter.refined().white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
     return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
 
 

@@ -6,7 +6,8 @@ place is enough to compare them all; the screening then simulates the best ones.
 
 import numpy as np
 
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.response import direction, motion_of, response
 
 PEAKS = 6  # guesses
@@ -19,7 +20,7 @@ ALIKE = 0.7  # share that two spots have in common, from which they count as one
 RIDGE = 1e-9
 
 
-def ripples(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     """Amplitude [N or N m], periods per radian and phase of likely torque ripple, best first, shape (PEAKS, 3).
 
     Args:
@@ -27,8 +28,8 @@ def ripples(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
     """
-    plant = fitter.follower.log.plant
-    rows = fitter.follower.log.rows
+    plant = fitter.log.plant
+    rows = fitter.log.rows
     motion = motion_of(fitter, fit)
     radius = fit.hypothesis.model.parameters["wheel_radius"] if "wheel_radius" in plant.parameters else 1.0
     joints = [plant.joints.index(site) for site in plant.actuated]
@@ -55,7 +56,7 @@ def ripples(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     return np.column_stack([amplitudes[chosen], numbers[chosen], phases[chosen]])
 
 
-def sticky_spots(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     """Level [N], begin and end [m] of likely sticky spots of the first joint, best first, shape (up to PEAKS, 3).
 
     Args:
@@ -63,7 +64,7 @@ def sticky_spots(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
     """
-    log = fitter.follower.log
+    log = fitter.log
     motion = motion_of(fitter, fit)
     x, rate = motion[log.plant.coordinates[0]], motion[log.plant.rates[0]]
     edges = np.linspace(x[log.rows].min(), x[log.rows].max(), BINS + 1)

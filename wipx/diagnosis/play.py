@@ -9,7 +9,8 @@ from itertools import product
 import numpy as np
 
 from wipx.core.model import ModelBatch
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.places import left_of
 
 EFFECT = "actuator/backlash"
@@ -22,7 +23,7 @@ CONTACT_TIME = 5e-4  # [s]
 TOGETHER = 26  # models simulated at once; bounds the memory
 
 
-def plays(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def plays(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     """Likely gaps [m or rad], numbers of the free drive, and times of contact, best first.
 
     Args:
@@ -33,7 +34,7 @@ def plays(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     Returns:
         Shape (GUESSES, 5).
     """
-    log = fitter.follower.log
+    log = fitter.log
     joint = log.plant.joints.index(log.plant.actuated[0])
     way = float(np.ptp(log.measured[:, joint][log.rows]))
     inertia = 1.0 / float(np.median(fitter.follower.linear.b[:, joint, joint]))
@@ -50,7 +51,7 @@ def plays(fitter: Fitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     return guesses[np.argsort(-gains)[:GUESSES]]
 
 
-def _gains(fitter: Fitter, fit: Fit, basis: np.ndarray, left: np.ndarray, guesses: np.ndarray) -> np.ndarray:
+def _gains(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, left: np.ndarray, guesses: np.ndarray) -> np.ndarray:
     """By how much each guess makes the white innovations smaller [nats]."""
     names = tuple(f"{EFFECT}.{symbol}" for symbol in SYMBOLS)
     model = fit.hypothesis.model.with_effects({EFFECT: dict(zip(SYMBOLS, guesses[0].tolist(), strict=True))})

@@ -6,7 +6,8 @@ wrongly at the next one is the response (Ljung 1999, System Identification, sec.
 
 import numpy as np
 
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.whiteness import whitened_change
 from wipx.identify.linearisation import transition_over
 from wipx.sim.cache import cached
@@ -15,13 +16,13 @@ SLOW = 0.02  # of the largest speed, at which half of dry friction has built up
 FAST = 0.995  # quantile of the speed that counts as the largest
 
 
-def motion_of(fitter: Fitter, fit: Fit) -> dict[str, np.ndarray]:
+def motion_of(fitter: InnovationFitter, fit: Fit) -> dict[str, np.ndarray]:
     """Coordinates, rates, commands and time at every row, shape (K + 1, R) each.
 
     Coordinates and rates are those that the fit's observer expects: a force made of them knows nothing of the
     noise of the row that it is tested on.
     """
-    log = fitter.follower.log
+    log = fitter.log
     plant = log.plant
     gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
     state = fitter.follower.estimated(fit.hypothesis.model, gains, fit.levels.spread)
@@ -39,7 +40,7 @@ def direction(rate: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return rate / (np.abs(rate) + slow)
 
 
-def response(fitter: Fitter, fit: Fit, joint: int, forces: np.ndarray) -> np.ndarray:
+def response(fitter: InnovationFitter, fit: Fit, joint: int, forces: np.ndarray) -> np.ndarray:
     """Slopes of a fit's white innovations by the sizes of forces on a joint.
 
     Args:
@@ -66,7 +67,7 @@ def response(fitter: Fitter, fit: Fit, joint: int, forces: np.ndarray) -> np.nda
         gains.whitening,
         np.ascontiguousarray(forces.T),
     ).T
-    return whitened_change(innovations, fit.colour, log).reshape(len(forces), -1).T
+    return whitened_change(innovations, fit.noise, log).reshape(len(forces), -1).T
 
 
 @cached

@@ -20,10 +20,10 @@ def stretches(log: Log) -> np.ndarray:
     return np.unique(labels.T, return_inverse=True)[1].reshape(labels.T.shape)
 
 
-def covariance(fit: Fit, log: Log) -> np.ndarray:
+def covariance(fit: Fit) -> np.ndarray:
     """Covariance of the position in the cube, shape (D, D); at least the plain one."""
     plain = np.linalg.pinv(fit.information)
-    scores = _scores(fit, log)
+    scores = _scores(fit)
     sandwich = plain @ (scores.T @ scores) @ plain
     # a number without influence may come out a little below zero
     wider = np.sqrt(np.maximum(np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300), 1.0))
@@ -32,20 +32,19 @@ def covariance(fit: Fit, log: Log) -> np.ndarray:
     return found
 
 
-def inflation(fit: Fit, log: Log, indices: list[int]) -> float:
+def inflation(fit: Fit, indices: list[int]) -> float:
     """By how much evidence for parameters is overstated: variance of their estimates over the plain one, at least 1."""
     if not indices:
         return 1.0
     plain = np.diag(np.linalg.pinv(fit.information))
-    robust = np.diag(covariance(fit, log))
+    robust = np.diag(covariance(fit))
     return float(max(1.0, np.median(robust[indices] / np.maximum(plain[indices], 1e-300))))
 
 
-def _scores(fit: Fit, log: Log) -> np.ndarray:
-    """Sum of slopes times innovations over each stretch, shape (stretches, D)."""
-    white = fit.white.ravel()
-    labels = np.repeat(stretches(log)[:, None], fit.white.shape[1], axis=1).ravel()
-    return sums_over(labels, fit.jacobian[: white.size] * white[:, None])
+def _scores(fit: Fit) -> np.ndarray:
+    """Sum of slopes times white errors over each stretch, shape (stretches, D)."""
+    labels = np.unique(fit.blocks, return_inverse=True)[1].ravel()
+    return sums_over(labels, fit.jacobian[: fit.white.size] * fit.white.ravel()[:, None])
 
 
 def sums_over(labels: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def hides(fit: Fit, effect: str) -> bool:
 
 def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
     """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
-    intervals = fitter.follower.log.intervals
+    intervals = fitter.log.intervals
     row = max(float(np.median(intervals[intervals > 0.0])), FASTEST)
     guesses = np.arange(row, max(PER_ROW * LONGEST, 2.0 * row), row) / PER_ROW
     values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)

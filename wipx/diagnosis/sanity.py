@@ -14,9 +14,10 @@ from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.follower import Follower
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.diagnosis.selection import Selection
@@ -77,7 +78,7 @@ class Slip:
         return True
 
 
-def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
+def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
     """Refuse a robot.yaml that the recordings contradict grossly.
 
     The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside.
@@ -92,8 +93,8 @@ def check_plausible(fitter: Fitter, setting: Setting, nominal: Fit, best: Fit, w
     Raises:
         InputError: a sign, a unit or a zero is wrong; the message says which and how to mend it.
     """
-    log = fitter.follower.log
-    probe = _Case.of(fitter.follower.simulator, _probed(log.recordings), setting, nominal.levels)
+    log = fitter.log
+    probe = _Case.of(fitter.simulator, _probed(log.recordings), setting, nominal.levels)
     possible = [slip for slip in slips(setting.nominal) if slip.leaves_motion(log)]
     mended = [(probe.without(slip), slip) for slip in possible]
     case, slip = max(mended, key=lambda pair: pair[0].nominal_likelihood)
@@ -204,7 +205,7 @@ class _Case:
         density: Log-likelihood that is due to the units alone.
     """
 
-    fitter: Fitter
+    fitter: InnovationFitter
     setting: Setting
     nominal: Fit | None
     levels: NoiseLevels
@@ -220,13 +221,13 @@ class _Case:
         density: float = 0.0,
     ) -> "_Case":
         log = Log.of(recordings, setting.nominal.plant)
-        fitter = Fitter(Follower.of(simulator, log, setting.nominal))
+        fitter = InnovationFitter(Follower.of(simulator, log, setting.nominal))
         return cls(fitter, setting, _polished(fitter, Hypothesis.of(setting, (), {}), levels), levels, density)
 
     @property
     def values(self) -> int:
         """How many recorded values count."""
-        log = self.fitter.follower.log
+        log = self.fitter.log
         return int(log.counted.sum()) * log.signals
 
     @property
@@ -250,7 +251,7 @@ class _Case:
 
     def without(self, slip: Slip) -> "_Case":
         """The same recordings with a slip put right."""
-        log = self.fitter.follower.log
+        log = self.fitter.log
         recordings = tuple(slip.recording(r) for r in log.recordings)
         model = slip.model(self.setting.nominal)
         scales = scales_of(model, recordings)
@@ -259,13 +260,13 @@ class _Case:
         levels = NoiseLevels(force, self.levels.sensor * factors)
         density = int(log.counted.sum()) * float(np.log(factors).sum())
         mended = Setting(model, self.setting.uncertainty, scales)
-        return _Case.of(self.fitter.follower.simulator, recordings, mended, levels, density)
+        return _Case.of(self.fitter.simulator, recordings, mended, levels, density)
 
     def _likelihood(self, fit: Fit | None) -> float:
         return -np.inf if fit is None else fit.log_likelihood + self.density
 
 
-def _polished(fitter: Fitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit | None:
+def _polished(fitter: InnovationFitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit | None:
     """The best values and noise; None where the model runs away from the recordings."""
     try:
         fit = fitter.polished(fitter.fit(hypothesis, levels), rounds=ROUNDS)
@@ -274,7 +275,7 @@ def _polished(fitter: Fitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fi
     return None if _runs_away(fitter, fit) or not np.isfinite(fit.log_likelihood) else fit
 
 
-def _runs_away(fitter: Fitter, fit: Fit) -> bool:
+def _runs_away(fitter: InnovationFitter, fit: Fit) -> bool:
     """Whether innovations are at the bound of what is counted; the colour takes a constant for no error at all."""
     follower, levels = fitter.follower, fit.levels
     batch = fit.hypothesis.space.batch(fit.hypothesis.cube)

@@ -15,6 +15,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.hypothesis import Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.limits import saturations, speed_limits
 from wipx.diagnosis.places import ripples, sticky_spots
 from wipx.diagnosis.play import plays
@@ -24,7 +25,9 @@ FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proport
 FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
 CHUNK = 24  # models simulated at once; bounds the memory
 
-SCANS: dict[str, Callable[[Fitter, Fit, np.ndarray], np.ndarray]] = {
+Scan = Callable[[InnovationFitter, Fit, np.ndarray], np.ndarray]
+
+SCANS: dict[str, Scan] = {
     "ripple": ripples,
     "sticky_spot": sticky_spots,
     "saturation": saturations,
@@ -66,7 +69,8 @@ def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = Fals
     present = set(fit.hypothesis.model.effects)
     found: list[Prospect] = []
     for name, effect in known.items():
-        if effect.beyond == beyond and not _excluded(name, effect, present, known):
+        wanted = effect.beyond if beyond else fitter.looks_for(name, effect)
+        if wanted and not _excluded(name, effect, present, known):
             found += prospects_of_effect(fitter, setting, fit, name)
     return sorted(found, key=lambda prospect: -prospect.gain)
 
@@ -109,7 +113,7 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
     scan = SCANS.get(effect.kind)
-    atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else scan(fitter, fit, basis)
+    atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
     low, high = _bounds(setting, name, effect)
@@ -131,6 +135,12 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
             start = dict(zip(names, values.tolist(), strict=True))
             found.append(Prospect(name, float(gain), start, float(estimate), float(deviation)))
     return found
+
+
+def _scanned(scan: Scan, fitter: Fitter, fit: Fit) -> np.ndarray:
+    """First guesses of an effect from how innovations answer to forces at single rows."""
+    by_row, seen = fitter.seen_by_row(fit)
+    return scan(by_row, seen, basis_of(seen))
 
 
 def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np.ndarray]:

@@ -7,36 +7,29 @@ that the small print of a law is not filled up with further effects.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from wipx.core.diagnosis import Candidate
 from wipx.diagnosis import rough
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.nested import parted, simple_law, simple_values, simpler
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.screening import SCANS, Prospect, prospects, prospects_of_effect, undosed
 
 MOST_EFFECTS = 8
-FREE_EFFECTS = 4  # beyond them an effect must transfer: small ones easily fill up what nothing explains
-LEAST_GAIN = 8.0  # nats beyond the penalty
 LEAST_SHARE = 0.01  # of what is explained already
 STICKING_SHARE = 0.05  # that bristles gain by how a joint comes to rest, where their bending is invisible
-MOST_ASKED = 80.0  # nats that the share asks for, at most
-CONSIDERED = 6  # effects that are fitted in each step
-PROMISING = 0.05  # of the best expected gain, below which an effect is not fitted
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 POLISHED = 3  # effects for which they are, at most
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
-WORTHLESS = 3.0  # nats of expected gain below which nothing is fitted
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
-LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
 LEAST_LEAD = 4.0  # nats by which a replacement must be better, and a rich law than the simple one that it contains
 
 
@@ -105,7 +98,7 @@ class Selection:
         which it is made.
         """
         moved = larger.motion_likelihood - smaller.motion_likelihood
-        reported = larger.colour.reported - smaller.colour.reported
+        reported = larger.noise.reported - smaller.noise.reported
         return float(moved + min(reported, max(moved, 0.0)))
 
     def score(self, fit: Fit, base: Fit) -> float:
@@ -123,9 +116,8 @@ class Selection:
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
-        overstated = inflation(larger, self.fitter.follower.log, indices)
-        share = min((rough.SHARE if rough.leaves_open(smaller, added) else LEAST_SHARE) * explained, MOST_ASKED)
-        return float(overstated * (penalty + max(LEAST_GAIN, share)))
+        overstated = inflation(larger, indices)
+        return float(overstated * (penalty + self.fitter.asked(smaller, larger, explained)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""
@@ -143,7 +135,7 @@ class Selection:
             worth = found if self.worthwhile(current, found) else self.plainer(found, found.effects[-1])
             if worth is None or not self.worthwhile(current, worth):
                 continue
-            if len(worth.effects) <= FREE_EFFECTS or self.transfers(current, worth):
+            if len(worth.effects) <= self.fitter.unproven or self.transfers(current, worth):
                 return worth
             self._fleeting.add(frozenset(worth.effects))
         return None
@@ -156,7 +148,7 @@ class Selection:
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
-        if len(current.effects) + 2 > FREE_EFFECTS:
+        if len(current.effects) + 2 > self.fitter.unproven:
             return None
         for one in extended[:PAIRED]:
             if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
@@ -191,8 +183,7 @@ class Selection:
         Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother. Where the
         likelihood of an effect has many peaks, the highest may be another one beside further effects.
         """
-        louder = replace(fit.levels, force=LOUDER * fit.levels.force)
-        found = [self.fitter.polished(self.fitter.fit(fit.hypothesis, louder))]
+        found = [self.fitter.polished(self.fitter.fit(fit.hypothesis, self.fitter.loosened(fit)))]
         moved = rough.explored(self.fitter, fit)
         if moved is not fit:
             found.append(self.fitter.polished(moved))
@@ -215,18 +206,18 @@ class Selection:
         if not fits:
             return None
         best = max(fits, key=lambda fit: self.score(fit, base))
-        replaced = simpler(best, self.fitter.follower.log)
+        replaced = simpler(best, self.fitter.log)
         while replaced is not None:
             found = self.fitted(replaced, best)
             if self.score(found, base) < self.score(best, base) - self._tolerance(best, replaced):
                 break
             best = found
-            replaced = simpler(best, self.fitter.follower.log)
+            replaced = simpler(best, self.fitter.log)
         for effect in best.effects:
             plain = self.plainer(best, effect)
-            if plain is not None and self.score(best, base) - self.score(plain, base) < LEAST_LEAD:
+            if plain is not None and self.score(best, base) - self.score(plain, base) < self.fitter.richer_by:
                 return plain
-        parts = parted(best, self.fitter.follower.log)
+        parts = parted(best, self.fitter.log)
         if parts is not None:
             found = self.settled(self.fitted(parts, best))
             best = found if self.score(found, base) > self.score(best, base) else best
@@ -314,8 +305,9 @@ class Selection:
         by_effect: dict[str, list[Prospect]] = {}
         for prospect in ranked:
             by_effect.setdefault(prospect.effect, []).append(prospect)
-        least = max(PROMISING * ranked[0].gain, WORTHLESS) if ranked else WORTHLESS
-        leading = [name for name in by_effect if by_effect[name][0].gain >= least][:CONSIDERED]
+        best = max((ranked[0].gain if ranked else 0.0), 0.0)
+        least = max(self.fitter.promising * best, self.fitter.worthless)
+        leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
         leading += [name for name in by_effect if rough.hides(fit, name) and name not in leading]
         fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
         fits.sort(key=lambda f: -self.score(f, fit))
@@ -339,7 +331,7 @@ class Selection:
             begins += [guess for begin in begins[:: len(own)] for guess in rough.delays(self.fitter, begin, levels)]
             count = rough.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)
-        fits = [self.fitter.fit(begin, levels, steps=5) for begin in likeliest]
+        fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
         if starts[0].effect.partition("/")[2] in rough.ROUGH:
             fits = [rough.explored(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)

@@ -4,37 +4,36 @@ from wipx.core.diagnosis import Diagnosis, FoundEffect
 from wipx.core.results import FitErrors
 from wipx.core.words import effect_in_words
 
+NEARLY = 1.3  # times the noise floor, errors up to which are told as being at it
 FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The answer in one sentence or two."""
+    """The answer in one sentence or two: what was left out, how much of the mismatch is gone, and how much stays."""
     kind = diagnosis.nominal.plant.kind
-    share = explained_share(diagnosis)
     parts = [_with_size(effect, kind) for effect in diagnosis.effects]
     listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
-    verb = "was" if len(parts) == 1 else "were"
-    named = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {'it' if len(parts) == 1 else 'them'} explains"
-    if diagnosis.verdict == "consistent" and (ratio := times_the_floor(diagnosis.held_out)) > FAR_OFF:
-        return (
-            "No missing effect shows itself from row to row, but predictions over "
-            f"{diagnosis.held_out.horizon:g} s are {ratio:.0f} times worse than sensor noise makes them: "
-            "record other excitations."
-        )
-    if diagnosis.verdict == "consistent":
-        return "The nominal model explains the recordings up to noise: nothing is missing."
-    if diagnosis.verdict == "mismatch":
-        return f"{named} {share:.0%} of the mismatch."
-    if any(effect.beyond for effect in diagnosis.effects):
-        return f"{named} {share:.0%} of the mismatch; the vocabulary has no name for {diagnosis.unexplained.shape}."
-    shape = diagnosis.unexplained.shape
-    rest = f"{shape[:1].upper()}{shape[1:]} that no effect of the vocabulary explains"
-    return f"{rest} is left over." if not parts else f"{named} a part of the mismatch. {rest} is left over."
+    verb, them = ("was", "it") if len(parts) == 1 else ("were", "them")
+    stays = _stays(diagnosis.held_out)
+    if not parts and diagnosis.verdict == "consistent":
+        return f"Nothing is missing that these recordings show: {stays}."
+    if not parts:
+        return f"No effect of the vocabulary explains what is missing: {stays}."
+    share = explained_share(diagnosis.held_out)
+    found = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {them} removes {share:.0%} of the mismatch"
+    return f"{found}, and {stays}."
 
 
-def explained_share(diagnosis: Diagnosis) -> float:
+def _stays(errors: FitErrors) -> str:
+    """The error that stays beside the sensors' floor."""
+    times = times_the_floor(errors)
+    if times <= NEARLY:
+        return f"predictions over {errors.horizon:g} s err as little as sensor noise lets them"
+    return f"predictions over {errors.horizon:g} s err {times:.2g} times as much as white sensor noise makes them"
+
+
+def explained_share(errors: FitErrors) -> float:
     """Share of the explainable squared prediction error on held-out recordings that the completed model removes."""
-    errors = diagnosis.held_out
     removed = total = 0.0
     for name, floor in errors.noise_floor.items():
         scale = max(floor, 1e-12) ** 2

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from wipx.core.diagnosis import Curve
-from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.leftover import Leftover, Shape, leftovers
 from wipx.diagnosis.log import Log
 from wipx.effects.remainder import COMMANDS, KNOTS, TIME
@@ -50,12 +51,12 @@ def process_mean(slopes: np.ndarray, white: np.ndarray, knots: np.ndarray) -> tu
     return -covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def with_curve(fitter: Fitter, setting: Setting, fit: Fit, leftover: Leftover) -> tuple[Fit, np.ndarray]:
+def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, leftover: Leftover) -> tuple[Fit, np.ndarray]:
     """A fit with a force over one signal added, refined, and the force's standard deviation at the knots."""
     shape = leftover.shape
-    name = f"{fitter.follower.log.plant.joints[shape.joint]}/remainder"
+    name = f"{fitter.log.plant.joints[shape.joint]}/remainder"
     force = np.zeros(KNOTS)
-    log = fitter.follower.log
+    log = fitter.log
     current = fitter.fit(with_force(setting, fit, name, shape, force, log), fit.levels, steps=0)
     spread = np.zeros(KNOTS)
     for _ in range(ROUNDS):

@@ -19,7 +19,7 @@ from wipx.core.parameters import Scales
 from wipx.core.results import Estimate
 from wipx.diagnosis.decision import Rest
 from wipx.diagnosis.fitting import Fit
-from wipx.diagnosis.heldout import row_likelihoods, transfer
+from wipx.diagnosis.heldout import transfer
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.inquiry import Inquiry
 from wipx.diagnosis.nested import CONTAINS, simple_values
@@ -116,7 +116,7 @@ class _Asked:
         base = self.caught_up(base, free)
         best = self.caught_up(self.rest.fit, free)
         repeated = transfer(inquiry.fitter, free)
-        known = row_likelihoods(inquiry.fitter, base, base.white)
+        known = inquiry.fitter.by_recording(base, base.white)
         numbers = estimates(inquiry.fitter, free, selection.nominal)
         suspect = Suspect(
             name=self.name,
@@ -198,7 +198,7 @@ class _Asked:
         if rest.strongest is None or not len(rest.spread):
             return best
         without = fitter.fit(Hypothesis.of(setting, effects, best.hypothesis.values), best.levels)
-        anew, _ = with_curve(fitter, setting, without, rest.strongest)
+        anew, _ = with_curve(self.inquiry.by_row, setting, without, rest.strongest)
         return max(best, anew, key=lambda fit: fit.log_likelihood)
 
     def caught_up(self, fit: Fit, other: Fit) -> Fit:

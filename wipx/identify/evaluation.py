@@ -1,5 +1,6 @@
 """Judging a model: prediction errors over windows, and the predictions themselves."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,11 +33,14 @@ class Judge:
         simulator: The engine.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
         horizon: Length of a prediction [s].
+        bandwidths: Of the filter for models that have none of their own, by coordinate [rad/s]; None for those that
+            learn it.
     """
 
     simulator: Simulator
     noise: np.ndarray
     horizon: float
+    bandwidths: Mapping[str, float] | None = None
 
     def predict(self, model: Model, recordings: tuple[Recording, ...]) -> list[np.ndarray]:
         """Predicted coordinates of each recording, shape (rows, joints); NaN before the first window."""
@@ -91,14 +95,15 @@ class Judge:
         """Windows of the recordings, each with the states of the filter that it starts from."""
         smoother = self._smoother(model, recordings)
         windows = cut(recordings, model.plant, horizon=self.horizon, lead=LEAD)
-        if model.bandwidths:
-            known = np.array([model.bandwidths[name] for name in model.plant.coordinates])
+        bandwidths = model.bandwidths or self.bandwidths
+        if bandwidths:
+            known = np.array([bandwidths[name] for name in model.plant.coordinates])
             return starts_of(smoother, windows, model, [known])
-        bandwidths = [np.full(len(self.noise), bandwidth) for bandwidth in BANDWIDTHS]
+        filters = [np.full(len(self.noise), bandwidth) for bandwidth in BANDWIDTHS]
         trials = cut(recordings, model.plant, horizon=self.horizon, lead=LEAD, stride=TRIAL)
-        tried = starts_of(smoother, trials, model, bandwidths)
-        starts = starts_of(smoother, windows, model, bandwidths)
-        return starts.of(self._choice(model, tried, starts, len(bandwidths)))
+        tried = starts_of(smoother, trials, model, filters)
+        starts = starts_of(smoother, windows, model, filters)
+        return starts.of(self._choice(model, tried, starts, len(filters)))
 
     def _choice(self, model: Model, tried: Starts, starts: Starts, count: int) -> np.ndarray:
         """Filter from which each window starts: that of the least error in the rows of trials that it may see."""

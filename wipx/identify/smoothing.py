@@ -24,7 +24,7 @@ from wipx.identify.windows import LOOK_AHEAD, Windows
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
 from wipx.sim.inputs import Inputs
-from wipx.sim.simulator import Path
+from wipx.sim.simulator import Path, Rollouts
 
 BANDWIDTHS = (1.0, 3.0, 10.0, 30.0, 100.0)  # [rad/s] from nearly no disturbance to nearly no model
 FIRST_SPAN = 0.05  # [s] of rows from which the first rates are read
@@ -57,11 +57,38 @@ class Smoother:
             model: The model.
             bandwidths: Of each joint's filter, each of shape (joints,) [rad/s].
         """
-        inputs, measured = self._inputs, self._measured
-        joints, recordings = measured.shape[1:]
-        scale = np.array([1.0 + _value(model, f"sensor_{name}/scale", "e") for name in self.plant.coordinates])
-        late = _delays(model)
+        measured, late, scale = self._measured, _delays(model), self._scale(model)
         filters = [self._filtered(model, bandwidth) for bandwidth in bandwidths]
+        shown = self._followed(model, filters)
+        found = np.zeros((len(filters), len(measured), 2 * measured.shape[1], measured.shape[2]))
+        for b, each in enumerate(filters):
+            coordinates, rates = shown.coordinates[:, :, b] / scale[:, None], shown.rates[:, :, b]
+            surprises = np.nan_to_num(measured / scale[:, None] - coordinates)
+            prior = np.concatenate([coordinates + late[:, None] * rates, rates], axis=1)
+            _smooth(*each, self._inputs.t, self._inputs.last, late, surprises, prior, found[b])
+        return found * np.tile(scale, 2)[:, None]
+
+    def disturbance(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
+        """Acceleration that a model lacks at every row, by the rows up to it, shape (K + 1, joints, R).
+
+        Args:
+            model: The model.
+            bandwidth: Of each joint's filter, shape (joints,) [rad/s].
+        """
+        each = self._filtered(model, bandwidth)
+        shown = self._followed(model, [each])
+        joints = self._measured.shape[1]
+        surprises = np.nan_to_num(self._measured - shown.coordinates[:, :, 0]) / self._scale(model)[:, None]
+        return np.cumsum(np.einsum("krij,kjr->kir", each.gains[:, :, 2 * joints :], surprises), axis=0)
+
+    def _scale(self, model: Model) -> np.ndarray:
+        """What the sensors show of one unit, shape (joints,)."""
+        return np.array([1.0 + _value(model, f"sensor_{name}/scale", "e") for name in self.plant.coordinates])
+
+    def _followed(self, model: Model, filters: "Sequence[_Filter]") -> Rollouts:
+        """What a model, kept close by each of B filters, shows at every row before it is corrected there."""
+        inputs, measured, scale = self._inputs, self._measured, self._scale(model)
+        joints, recordings = measured.shape[1:]
         gains = np.stack([each.gains for each in filters]) / scale
         recorded = np.zeros((len(measured), 2 * joints, recordings))
         recorded[:, :joints] = measured
@@ -74,16 +101,7 @@ class Smoother:
         observer = Observer(recorded, corrections, np.arange(count), idle, drift=drift)
         start = np.repeat(self._first_states(model)[:, None], count, axis=1)
         batch = ModelBatch(model, (), np.zeros((count, 0)))
-        shown = self.simulator.follow(batch, inputs, start, observer)
-        found = np.zeros((count, len(measured), 2 * joints, recordings))
-        for b, each in enumerate(filters):
-            coordinates, rates = shown.coordinates[:, :, b] / scale[:, None], shown.rates[:, :, b]
-            surprises = np.nan_to_num(measured / scale[:, None] - coordinates)
-            prior = np.concatenate([coordinates + late[:, None] * rates, rates], axis=1)
-            _smooth(*each, inputs.t, inputs.last, late, surprises, prior, found[b])
-        found[:, :, :joints] *= scale[:, None]
-        found[:, :, joints:] *= scale[:, None]
-        return found
+        return self.simulator.follow(batch, inputs, start, observer)
 
     def spread(self, model: Model, bandwidth: np.ndarray, rows: np.ndarray, recordings: np.ndarray) -> np.ndarray:
         """Covariance of true states at some rows by sensor noise and disturbance, shape (N, 2 joints, 2 joints).
@@ -105,8 +123,7 @@ class Smoother:
         inputs, measured = self._inputs, self._measured
         joints, recordings = measured.shape[1:]
         linear = linearise_along(model, measured)
-        scale = np.array([1.0 + _value(model, f"sensor_{name}/scale", "e") for name in self.plant.coordinates])
-        sensor = self.noise / np.abs(scale)
+        sensor = self.noise / np.abs(self._scale(model))
         n, rows = 3 * joints, len(measured)
         gains = np.zeros((rows, recordings, n, joints))
         covariance = np.zeros((rows, recordings, n, n))

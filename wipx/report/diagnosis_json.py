@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect, Location, Suspect, SuspectedSize, Unexplained
+from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect, Location, Remainder, Suspect, SuspectedSize, Unexplained
 from wipx.core.results import Estimate, FitErrors
 from wipx.report.diagnosis_words import next_step, symbol_of
 
@@ -27,6 +27,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
             "heldout": _errors(diagnosis.held_out),
         },
         "unexplained": _unexplained(diagnosis.unexplained),
+        "remainder": None if diagnosis.remainder is None else _remainder(diagnosis.remainder),
         "bounds": [_bound(bound) for bound in diagnosis.bounds],
         "combined": [
             {
@@ -96,6 +97,31 @@ def _unexplained(left: Unexplained) -> dict[str, object]:
         "site": left.site,
         "shape": left.shape,
         "resembles": list(left.resembles),
+    }
+
+
+def _remainder(left: Remainder) -> dict[str, object]:
+    return {
+        "share_gone": float(left.share_gone),
+        "times_floor": _floats(left.times_floor),
+        "matters": bool(left.matters),
+        "horizons": [
+            {"horizon_s": float(e.horizon), "nominal": _floats(e.nominal), "completed": _floats(e.completed)}
+            for e in left.horizons
+        ],
+        "forces": [
+            {
+                "site": force.site,
+                "rms": float(force.size),
+                "unit": force.unit,
+                "correlation_time_s": float(force.lasting),
+                "kind": force.kind,
+                "signal": force.signal,
+                "period": None if force.period is None else float(force.period),
+                "share": float(force.share),
+            }
+            for force in left.forces
+        ],
     }
 
 

@@ -14,7 +14,14 @@ from wipx.report.diagnosis_rows import (
     site_bars,
     suspect_rows,
 )
-from wipx.report.diagnosis_words import PLANTS, VERDICTS, period_sentence, region_sentence, unexplained_sentence
+from wipx.report.diagnosis_words import (
+    PLANTS,
+    VERDICTS,
+    period_sentence,
+    region_sentence,
+    remainder_sentences,
+    unexplained_sentence,
+)
 from wipx.report.estimates import marked_rows
 from wipx.report.files import write_whole
 from wipx.report.html import render
@@ -67,6 +74,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             "corrected": marked_rows(diagnosis.corrected),
             "bounds": bound_rows(diagnosis),
             "unexplained": unexplained_sentence(diagnosis),
+            "remainder": remainder_sentences(diagnosis) if diagnosis.unexplained.significant else (),
             "menu": menu_bars(diagnosis),
             "model_rows": model_rows(diagnosis),
         },

@@ -9,6 +9,7 @@ from wipx.report.diagnosis_words import (
     nats,
     next_step,
     percent,
+    remainder_sentences,
     tie_sentence,
     unexplained_sentence,
     value_in_words,
@@ -27,6 +28,8 @@ def summary(diagnosis: Diagnosis) -> str:
         corrected = ", ".join(value_in_words(number) for number in diagnosis.corrected)
         lines.append(f"  corrected: {corrected}")
     lines += [headline(diagnosis), unexplained_sentence(diagnosis)]
+    if diagnosis.unexplained.significant:
+        lines += [f"  {sentence}" for sentence in remainder_sentences(diagnosis)]
     lines += [f"asked: {suspect.sentence}" for suspect in diagnosis.suspects]
     following = next_step(diagnosis.next_experiment)
     if following is not None:

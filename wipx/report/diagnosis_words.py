@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, NextExperiment, Period, Region
+from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, LeftForce, NextExperiment, Period, Region
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
@@ -128,16 +128,58 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     chance = p_value(left.p_value)
     aside = f" ({chance})" if chance else ""
     if not left.significant:
-        return f"Nothing significant is left over{aside}: what remains looks like sensor noise."
+        return f"Nothing significant is left over{aside}."
     kind = diagnosis.model.plant.kind
     place = f" at {site_in_words(left.site, kind)}" if left.site else ""
     shape = f": {left.shape}" if left.shape else ""
-    sentence = f"A significant part is left over{place}{aside} that no effect of the vocabulary explains{shape}."
+    grade = "It matters for predictions." if is_grave(diagnosis) else "It is small: predictions hardly suffer."
+    sentence = f"A part is left over{place}{aside} that no effect of the vocabulary explains{shape}. {grade}"
     named = {effect.name for effect in diagnosis.effects}
     others = [effect_in_words(name, kind) for name in left.resembles if name not in named]
     if others:
         sentence += f" It resembles {' or '.join(others)}."
     return sentence
+
+
+def is_grave(diagnosis: Diagnosis) -> bool:
+    """Whether what is left over matters for predictions."""
+    return diagnosis.remainder is None or diagnosis.remainder.matters
+
+
+def remainder_sentences(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """What the completed model leaves on each joint, one sentence each."""
+    if diagnosis.remainder is None:
+        return ()
+    kind = diagnosis.model.plant.kind
+    return tuple(
+        f"On {site_in_words(force.site, kind)} a force of {compact(force.size, 2)} {force.unit} (root mean square) "
+        f"stays, correlated over {compact(force.lasting, 2)} s; {_goes_with(force, diagnosis)}."
+        for force in diagnosis.remainder.forces
+    )
+
+
+def _goes_with(force: LeftForce, diagnosis: Diagnosis) -> str:
+    """What a force that is left goes with."""
+    if force.kind == "random" or force.signal is None:
+        return "it goes with no signal, turn or period, and may be random"
+    share = f"{percent(force.share)} of it"
+    unit = diagnosis.units.get(force.signal, "")
+    if force.kind == "law":
+        return f"{share} goes with {force.signal}"
+    if force.kind == "gain":
+        return f"{share} follows {force.signal} with a gain that drifts"
+    assert force.period is not None
+    if force.kind == "swing":
+        return f"{share} swings at {compact(1.0 / force.period, 2)} Hz"
+    return f"{share} comes again every {compact(force.period, 3)} {unit} of {force.signal}{_turns(force, diagnosis)}"
+
+
+def _turns(force: LeftForce, diagnosis: Diagnosis) -> str:
+    """How often that is in a turn of the wheel; empty where there is no wheel."""
+    radius = diagnosis.model.parameters.get("wheel_radius")
+    if radius is None or force.signal != "x" or not force.period:
+        return ""
+    return f", {compact(2.0 * math.pi * radius / force.period, 2)} times in a turn of the wheel"
 
 
 def next_step(following: NextExperiment | None) -> str | None:

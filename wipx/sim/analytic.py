@@ -84,7 +84,7 @@ class AnalyticSimulator:
             path: Where the rollouts are led at first; None where they are left to themselves from the start.
         """
         run = _Run(self, batch, inputs)
-        run.advance(run.layout.states(initial), 0, run.layout.rows, path=path)
+        run.advance(run.layout.states(initial), run.begin(initial), run.layout.rows, path=path)
         return run.rollouts(inputs.commands[:, :, None, :])
 
     def follow(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, observer: Observer) -> Rollouts:
@@ -166,6 +166,13 @@ class _Run:
         self.out = np.empty((self.layout.rows + 1, 4, self.layout.lanes))
         self.past = self.layout.past(self.coefficients.present)
         self.delivered = np.zeros((1, 2, 1))
+
+    def begin(self, initial: np.ndarray) -> int:
+        """Row from which a replay must be simulated: that of the first step, where no sensor looks further back."""
+        row = 0 if self.coefficients.present[R.ON_SENSOR_DELAY] else int(self.inputs.first.min())
+        shown = self.layout.states(initial)[:4]
+        self.out[:row] = shown
+        return row
 
     def report(self) -> None:
         """Keep the forces of the drives too."""

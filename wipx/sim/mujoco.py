@@ -14,7 +14,7 @@ from wipx.sim.exchange import Exchange
 from wipx.sim.inputs import Inputs
 from wipx.sim.mechanism import EVENT, check_possible
 from wipx.sim.mjcf import mjcf
-from wipx.sim.simulator import Rollouts
+from wipx.sim.simulator import Path, Rollouts
 from wipx.sim.stepped import SteppedSimulator, World, single
 
 
@@ -35,10 +35,10 @@ class MujocoSimulator(SteppedSimulator):
         """
         return MujocoWorld(engine(), self.step)
 
-    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray) -> Rollouts:
+    def replay(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, path: Path | None = None) -> Rollouts:
         """Open loop, in MuJoCo's own batches where they serve; see `Simulator.replay`."""
-        if not mujoco_batch.serves(batch, inputs, initial, self.step):
-            return super().replay(batch, inputs, initial)
+        if path is not None or not mujoco_batch.serves(batch, inputs, initial, self.step):
+            return super().replay(batch, inputs, initial, path)
         for p in range(batch.size):
             check_possible(single(batch, p), self.name)
         return mujoco_batch.replay(engine(), batch, inputs, initial, self.step)

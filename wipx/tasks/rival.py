@@ -25,11 +25,7 @@ NETWORK = "residual.npz"
 
 @dataclass(frozen=True)
 class RunRival:
-    """Ask a rival about the recordings of a source.
-
-    Attributes:
-    """
-
+    """Ask a rival about the recordings of a source."""
 
     def run(self, job: Job) -> None:
         """Write diagnosis.json, model.yaml and, of a rival that learned one, the network."""

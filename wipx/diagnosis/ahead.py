@@ -1,0 +1,89 @@
+"""Which evidence decides: innovations where the laws hold row by row, forecasts where none holds exactly.
+
+Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
+hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
+So innovations have the first word. The search is repeated by forecasts where the first one leaves something
+significant over, or where its model predicts far above the sensors' floor although it is given all the time that a
+right model needs.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.diagnosis.decision import Rest, decided, significant_leftovers
+from wipx.diagnosis.fitting import LEAST_GAIN, Fit
+from wipx.diagnosis.forecasts import ForecastFitter
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.leftover import Shape, shapes_of
+from wipx.diagnosis.selection import Selection
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search ends with.
+
+    Attributes:
+        inquiry: The means, with the evidence that decided.
+        selection: The search.
+        rest: The final fit, and what it leaves over.
+        shapes: In which that was looked for.
+    """
+
+    inquiry: Inquiry
+    selection: Selection
+    rest: Rest
+    shapes: list[Shape]
+
+
+def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
+    """What is missing, by the evidence that suits the recordings.
+
+    Args:
+        inquiry: The means, with innovations as evidence.
+        selection: The search by innovations.
+        chosen: What it chose.
+    """
+    inquiry = inquiry.trusting(chosen)
+    shapes = shapes_of(inquiry.by_row, chosen)
+    left, _ = significant_leftovers(inquiry, selection, chosen, shapes)
+    if left:
+        return _by_forecasts(inquiry, chosen)[0]
+    rest, shapes = decided(inquiry, selection, chosen)
+    by_row = Found(inquiry, selection, rest, shapes)
+    if inquiry.is_trusted(rest.fit):
+        return by_row
+    ahead, lead = _by_forecasts(inquiry, rest.fit)
+    return ahead if lead >= LEAST_GAIN else by_row
+
+
+def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, float]:
+    """What forecasts find to be missing, and how far that leads what innovations chose [nats].
+
+    A second search starts from what innovations chose; the likelier end counts.
+    """
+    fitter, setting = ForecastFitter(inquiry.by_row, inquiry.first_levels), inquiry.setting
+    ahead = replace(inquiry, fitter=fitter)
+    nominal = fitter.begun(Hypothesis.of(setting, (), {}))
+    selection = Selection(fitter, setting, nominal, ahead.transfers)
+    best = selection.run()
+    own = [effect for effect in chosen.effects if effect in setting.space(chosen.effects).model.effects]
+    start = Hypothesis.of(setting, tuple(own), chosen.hypothesis.values)
+    same = fitter.polished(fitter.fit(start, best.levels)) if own else nominal
+    if own and set(own) != set(best.effects):
+        other = selection.pruned(same)
+        if selection.score(other, nominal) > selection.score(best, nominal):
+            best = selection.exchanged(other)
+    lead = selection.score(best, nominal) - selection.score(same, nominal)
+    ahead = ahead.trusting(best)
+    return Found(ahead, selection, *_left_over(ahead, selection, best)), lead
+
+
+def _left_over(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Rest, list[Shape]]:
+    """What forecasts leave over, as innovations show it."""
+    by_row, seen = inquiry.fitter.seen_by_row(fit)
+    shapes = shapes_of(by_row, seen)
+    left, p_value = significant_leftovers(inquiry, selection, seen, shapes)
+    strongest = max(left, key=lambda leftover: leftover.gain) if left else None
+    return Rest(fit, strongest, p_value, bool(left), (), np.zeros(0)), shapes

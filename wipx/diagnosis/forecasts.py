@@ -1,0 +1,297 @@
+"""Evidence of several horizons: the likelihood of predictions of one row to half a second.
+
+No law of a real machine holds exactly, and what a slightly wrong one misses row by row is taken for noise by whatever
+models the noise. What decides a prediction of half a second is slow. So errors at several horizons count side by side,
+each weighed by what it is at its horizon and by how it goes with the others: a composite likelihood (Varin, Vidoni
+2005, Biometrika 92(3)), divided by how often a row is predicted. Errors have heavy tails (multivariate t: Lange,
+Little, Taylor 1989, J. Am. Stat. Assoc. 84), since single predictions fall over.
+
+Predictions start from smoothed states (`wipx.identify.smoothing`). These depend on the model, as the filter of any
+hypothesis does, and are estimated anew when values have moved.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from scipy.special import stdtrit
+
+from wipx.core.effect import Effect
+from wipx.core.model import Model, ModelBatch
+from wipx.diagnosis.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.innovations import InnovationFitter
+from wipx.diagnosis.log import Log
+from wipx.diagnosis.observer import NoiseLevels
+from wipx.effects.catalogue import vocabulary
+from wipx.identify.smoothing import BANDWIDTHS, Smoother, Starts, starts_of
+from wipx.identify.windows import LOOK_AHEAD, Windows, cut
+from wipx.sim.analytic import AnalyticSimulator
+
+HORIZON = 0.5  # [s] of the longest prediction, contract section 4
+HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
+STRIDE = 0.25  # [s] from one start to the next
+LEAD = 0.1  # [s] of smoothed states before a start
+BLOCK = 1.0  # [s] of the stretches whose errors count as independent of each other
+LEVEL = 0.05  # at which any effect is named by chance
+TAILS = 5.0  # degrees of freedom of the errors' distribution
+ROUNDS = 12  # of the search for their covariance
+LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
+MACHINE = ("offset", "load_friction")  # kinds that section 6 of the contract has beside those of section 3
+STEP = 2.0  # times the simulator's usual step, exact enough where no law is
+TOO_FAR = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
+
+
+@dataclass(frozen=True)
+class Anchors:
+    """Where predictions start.
+
+    Attributes:
+        bandwidths: Of the filter that estimates the states, shape (joints,) [rad/s].
+        starts: The states.
+        spread: Of single commands about their mean: none.
+    """
+
+    bandwidths: np.ndarray
+    starts: Starts
+    spread: float = 0.0
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How errors of N predictions at H horizons are distributed.
+
+    Attributes:
+        whitening: Inverse Cholesky factor of their scale matrix, shape (H joints, H joints).
+        log_likelihood: Of the errors that it was fitted to, up to a constant.
+        reported: Nothing; reported forces are no part of it.
+    """
+
+    whitening: np.ndarray
+    log_likelihood: float
+    reported: float = 0.0
+
+
+@dataclass(frozen=True)
+class ForecastFitter(Fitter):
+    """Fits hypotheses to predictions at several horizons.
+
+    Attributes:
+        by_row: Fits the same recordings by innovations.
+        first_levels: A first guess of the noise, as innovations have it.
+    """
+
+    considered = 12
+    promising = 0.0
+    worthless = -np.inf
+    steps = 3
+    unproven = 0
+    richer_by = 8.0
+
+    by_row: InnovationFitter
+    first_levels: NoiseLevels
+    _seen: dict[tuple[tuple[str, ...], bytes], Fit] = field(default_factory=dict, compare=False, repr=False)
+
+    def looks_for(self, name: str, effect: Effect) -> bool:
+        """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
+        if effect.kind == "rotor_inertia":
+            return self.log.joints > 1 and not name.startswith("pitch/")
+        return not effect.beyond or effect.kind in MACHINE
+
+    @property
+    def log(self) -> Log:
+        """The recordings."""
+        return self.by_row.log
+
+    @cached_property
+    def simulator(self) -> AnalyticSimulator:
+        """The engine, with longer steps."""
+        by_row = self.by_row.simulator
+        return replace(by_row, step=by_row.step * STEP)
+
+    @property
+    def noise(self) -> np.ndarray:
+        """Sensor noise of each coordinate, shape (joints,) [m or rad]."""
+        return self.first_levels.sensor[: self.log.joints]
+
+    @property
+    def rows(self) -> int:
+        """Predictions that do not overlap."""
+        return max(int(self._counted.sum() * self._share), 2)
+
+    @cached_property
+    def blocks(self) -> np.ndarray:
+        """Number of the stretch of time of every error, shape (N, H joints)."""
+        number = np.floor(self.windows.starts / BLOCK).astype(np.int64) + 1_000_000 * self.windows.recording
+        return np.repeat(number[:, None], self._sampled.shape[0] * self.log.joints, axis=1)
+
+    @cached_property
+    def windows(self) -> Windows:
+        """The predictions."""
+        return cut(self.log.recordings, self.log.plant, horizon=HORIZON, lead=LEAD, stride=STRIDE)
+
+    @cached_property
+    def _sampled(self) -> np.ndarray:
+        """Row of each window at each horizon, shape (H, N)."""
+        t, windows = self.windows.inputs.t, self.windows
+        seen = np.sum(t <= windows.starts + LOOK_AHEAD + 1e-6, axis=0)
+        wanted = [np.sum(t < windows.starts + LOOK_AHEAD + horizon - 1e-6, axis=0) for horizon in HORIZONS]
+        rows = np.stack([np.minimum(np.maximum(row, seen), windows.inputs.last) for row in wanted])
+        apart = np.concatenate([[True], np.median(np.diff(rows, axis=0), axis=1) > 0.0])
+        return rows[apart]
+
+    @cached_property
+    def _counted(self) -> np.ndarray:
+        """Predictions that count: whole ones, of recordings that do, shape (N,)."""
+        windows = self.windows
+        last = windows.inputs.t[windows.inputs.last, np.arange(windows.count)]
+        interval = float(np.median(self.log.intervals[self.log.intervals > 0.0]))
+        whole = last >= windows.starts + HORIZON - 1.5 * interval - 1e-6
+        return whole & (windows.recording != (-1 if self.log.left_out is None else self.log.left_out))
+
+    @property
+    def _share(self) -> float:
+        """Share of a prediction that counts as independent of its neighbours."""
+        return min(STRIDE / HORIZON, 1.0)
+
+    def refined(self) -> "ForecastFitter":
+        """The same with half the step of the simulator."""
+        return ForecastFitter(self.by_row.refined(), self.first_levels)
+
+    def without(self, recording: int) -> "ForecastFitter":
+        """The same with a recording that does not count."""
+        return ForecastFitter(self.by_row.without(recording), self.first_levels)
+
+    def begun(self, hypothesis: Hypothesis) -> Fit:
+        """A first fit of a hypothesis, from starts of its own."""
+        return self.polished(self.fit(hypothesis, self.anchored(hypothesis.model)))
+
+    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+        """So much that stretches of time agree that the larger one predicts better (Vuong 1989, Econometrica 57(2)).
+
+        Student's test on the differences of their likelihoods, at a level for all effects that are looked at together.
+        """
+        stretch = np.unique(self.blocks[:, 0], return_inverse=True)[1].ravel()
+        differences = np.bincount(stretch, self._likelihoods(larger) - self._likelihoods(smaller))
+        kept = differences[np.bincount(stretch, self._counted) > 0]
+        count = len(kept)
+        if count < 2:
+            return np.inf
+        looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
+        reach = -float(stdtrit(count - 1, LEVEL / looked_at))
+        return max(LEAST_GAIN, reach * float(np.sqrt(count) * np.std(kept, ddof=1)))
+
+    def _likelihoods(self, fit: Fit) -> np.ndarray:
+        """Log-likelihood of each prediction, shape (N,)."""
+        scale = self._share * float(np.log(np.diag(fit.noise.whitening)).sum())
+        return np.where(self._counted, scale - 0.5 * np.sum(fit.white**2, axis=1), 0.0)
+
+    def loosened(self, fit: Fit) -> Anchors:
+        """Starts by the fit itself, of the best filter near its own."""
+        return self.anchored(fit.hypothesis.model, self._near(fit))
+
+    def spread_for(self, model: Model, levels: Anchors) -> Anchors:
+        """The same starts: commands are taken as the log has them."""
+        return levels
+
+    def seen_by_row(self, fit: Fit) -> tuple[InnovationFitter, Fit]:
+        """A fit as its innovations show it."""
+        key = (fit.hypothesis.space.names, fit.hypothesis.cube.tobytes())
+        if key not in self._seen:
+            begun = self.by_row.fit(fit.hypothesis, self.first_levels, steps=0)
+            self._seen[key] = self.by_row.fit(fit.hypothesis, self.by_row.levels_of(begun), steps=0)
+        return self.by_row, self._seen[key]
+
+    def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
+        """Starts by the model, of the filter from which its predictions are likeliest."""
+        tried = list(bandwidths) if bandwidths is not None else [np.full(self.log.joints, b) for b in BANDWIDTHS]
+        starts = starts_of(self._smoother, self.windows, model, tried)
+        batch = ModelBatch(model, (), np.zeros((len(tried), 0)))
+        errors = self._errors_from(batch, starts)
+        best = int(np.argmax([each.log_likelihood for each in self.noise_of(errors, None, model)]))
+        return Anchors(tried[best], starts.of(np.array([best])))
+
+    @cached_property
+    def _smoother(self) -> Smoother:
+        return Smoother(self.simulator, self.log.plant, self.log.recordings, self.noise)
+
+    def polished(self, fit: Fit, *, rounds: int = 2) -> Fit:
+        """Starts and values in turn until neither gains more."""
+        for _ in range(rounds):
+            again = self.fit(fit.hypothesis, self.anchored(fit.hypothesis.model, [fit.levels.bandwidths]))
+            if again.log_likelihood < fit.log_likelihood + POLISHED:
+                return max(fit, again, key=lambda each: each.log_likelihood)
+            fit = again
+        return fit
+
+    def _near(self, fit: Fit) -> list[np.ndarray]:
+        """Bandwidths of a fit, and those that differ in one joint or in all."""
+        best = fit.levels.bandwidths
+        factors = (1.0 / 3.0, 1.0, 3.0)
+        if len(best) == 1:
+            return [np.clip(best * factor, BANDWIDTHS[0], BANDWIDTHS[-1]) for factor in factors]
+        found = {
+            tuple(np.clip(best * np.array(pair), BANDWIDTHS[0], BANDWIDTHS[-1])) for pair in product(factors, factors)
+        }
+        return [np.array(each) for each in found]
+
+    def errors_of(self, batch: ModelBatch, levels: Anchors, model: Model) -> np.ndarray:
+        """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
+        return self._errors_from(batch, levels.starts)
+
+    def _errors_from(self, batch: ModelBatch, starts: Starts) -> np.ndarray:
+        windows, sampled = self.windows, self._sampled
+        joints, count = self.log.joints, windows.count
+        found = np.empty((batch.size, count, len(sampled) * joints))
+        size = max(1, LARGEST_CALL // (len(windows.inputs.t) * 4 * count))
+        recorded = windows.recorded[sampled, :, np.arange(count)]  # (H, N, joints)
+        for begin in range(0, batch.size, size):
+            part = np.arange(begin, min(begin + size, batch.size))
+            own = starts if starts.states.shape[2] == 1 else starts.of(part)
+            some = ModelBatch(batch.model, batch.names, None if batch.values is None else batch.values[part])
+            path = own.path(some)
+            shown = self.simulator.replay(some, windows.inputs, path.states[0], path).coordinates
+            at = np.stack([shown[rows, :, :, np.arange(count)] for rows in sampled])  # (H, N, joints, P)
+            errors = at - recorded[..., None]
+            errors = np.clip(np.nan_to_num(errors, nan=np.inf), -self._largest[:, None], self._largest[:, None])
+            errors = errors / self.noise[:, None] * self._counted[None, :, None, None]
+            found[part] = np.transpose(errors, (3, 1, 0, 2)).reshape(len(part), count, -1)
+        return found
+
+    @cached_property
+    def _largest(self) -> np.ndarray:
+        rows = np.moveaxis(self.windows.recorded, 1, 0)[:, self.windows.predicted]
+        return TOO_FAR * np.ptp(rows, axis=1) + 1e3 * self.noise
+
+    def noise_of(self, errors: np.ndarray, levels: Anchors | None, model: Model) -> list[Errors]:
+        """How each model's errors are distributed, by expectation and maximisation."""
+        some = errors[:, self._counted]
+        count, size = some.shape[1:]
+        weights = np.ones(some.shape[:2])
+        prior = size + 1.0  # errors' worth of what is known of correlations beforehand: nothing
+        for _ in range(ROUNDS):
+            scale = np.einsum("pna,pnb->pab", some * weights[..., None], some) / count
+            diagonal = np.einsum("paa->pa", scale)
+            scale = scale * count / (count + prior)
+            scale[:, np.arange(size), np.arange(size)] = np.maximum(diagonal, 1e-12)
+            whitening = np.linalg.inv(np.linalg.cholesky(scale))
+            squares = np.sum(np.einsum("pab,pnb->pna", whitening, some) ** 2, axis=2)
+            weights = (TAILS + size) / (TAILS + squares)
+        determinants = np.log(np.einsum("paa->pa", whitening)).sum(axis=1)
+        sums = 0.5 * (TAILS + size) * np.log1p(squares / TAILS).sum(axis=1)
+        likelihoods = self._share * (count * determinants - sums)
+        return [Errors(w, float(value)) for w, value in zip(whitening, likelihoods, strict=True)]
+
+    def whitened(self, errors: np.ndarray, noise: Errors) -> np.ndarray:
+        """White errors, shape (P, N, H joints), half of whose sum of squares is the loss of likelihood."""
+        white = errors @ noise.whitening.T
+        squares = np.maximum(np.sum(white**2, axis=2, keepdims=True), 1e-12)
+        worth = self._share * (TAILS + white.shape[2]) * np.log1p(squares / TAILS)
+        return white * np.sqrt(worth / squares)
+
+    def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
+        """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""
+        values = self._likelihoods(replace(fit, white=white))
+        return np.bincount(self.windows.recording, values, minlength=len(self.log.recordings))
