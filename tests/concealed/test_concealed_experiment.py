@@ -15,7 +15,7 @@ def wipx(*arguments: str) -> subprocess.CompletedProcess[str]:
 def test_help_names_the_experiment_and_its_profiles():
     text = wipx("--help").stdout
     assert "python -m wipx +experiment=concealed" in text
-    assert "profile: full, quick" in text
+    assert "profile: consistency_full, consistency_quick, full, quick" in text
 
 
 @pytest.mark.parametrize(("profile", "cases"), [("quick", 30), ("full", 300)])

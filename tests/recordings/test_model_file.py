@@ -90,3 +90,23 @@ def test_reading_runs_no_code(tmp_path: Path):
     with pytest.raises(InputError, match="line 1: tag !!python"):
         read_model(path)
     assert not trace.exists()
+
+
+def test_bandwidths_come_back(tmp_path: Path):
+    model = Model(
+        plant_of("wip"), random_model("wip", np.random.default_rng(1)).parameters, {}, {"x": 3.0, "theta": 10.0}
+    )
+    write_model(model, tmp_path / "model.yaml")
+    assert dict(read_model(tmp_path / "model.yaml").bandwidths) == {"x": 3.0, "theta": 10.0}
+
+
+@pytest.mark.parametrize(
+    ("bandwidths", "said"), [("{y: 3.0}", "y"), ("{x: 3.0}", "theta"), ("{x: -1.0, theta: 1.0}", "x")]
+)
+def test_bandwidths_at_fault_are_named(tmp_path: Path, bandwidths: str, said: str):
+    model = random_model("wip", np.random.default_rng(1))
+    path = tmp_path / "model.yaml"
+    write_model(Model(model.plant, model.parameters, {}), path)
+    path.write_text(path.read_text() + f"bandwidths: {bandwidths}\n")
+    with pytest.raises(InputError, match=f"bandwidths.*{said}"):
+        read_model(path)

@@ -16,7 +16,7 @@ from wipx.diagnosis.fitting import LEAST_GAIN, Fit
 from wipx.diagnosis.forecasts import ForecastFitter
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
-from wipx.diagnosis.leftover import Shape, shapes_of
+from wipx.diagnosis.leftover import Leftover, Shape, shapes_of
 from wipx.diagnosis.selection import Selection
 
 
@@ -47,14 +47,16 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     """
     inquiry = inquiry.trusting(chosen)
     shapes = shapes_of(inquiry.by_row, chosen)
-    left, _ = significant_leftovers(inquiry, selection, chosen, shapes)
+    left, _ = _left_by_row(inquiry, chosen, selection.nominal, shapes)
     if left:
         return _by_forecasts(inquiry, chosen)[0]
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
     if inquiry.is_trusted(rest.fit):
         return by_row
-    ahead, lead = _by_forecasts(inquiry, rest.fit)
+    ahead, lead = _by_forecasts(inquiry, chosen)
+    if rest.significant:
+        return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
     return ahead if lead >= LEAST_GAIN else by_row
 
 
@@ -68,10 +70,9 @@ def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, float]:
     nominal = fitter.begun(Hypothesis.of(setting, (), {}))
     selection = Selection(fitter, setting, nominal, ahead.transfers)
     best = selection.run()
-    own = [effect for effect in chosen.effects if effect in setting.space(chosen.effects).model.effects]
-    start = Hypothesis.of(setting, tuple(own), chosen.hypothesis.values)
-    same = fitter.polished(fitter.fit(start, best.levels)) if own else nominal
-    if own and set(own) != set(best.effects):
+    start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
+    same = fitter.polished(fitter.fit(start, best.levels)) if chosen.effects else nominal
+    if chosen.effects and set(chosen.effects) != set(best.effects):
         other = selection.pruned(same)
         if selection.score(other, nominal) > selection.score(best, nominal):
             best = selection.exchanged(other)
@@ -80,10 +81,16 @@ def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, float]:
     return Found(ahead, selection, *_left_over(ahead, selection, best)), lead
 
 
+def _left_by_row(inquiry: Inquiry, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Leftover], float]:
+    """What is left over by innovations; mean commands feign what swings, which does not count there."""
+    left, p_value = significant_leftovers(inquiry, fit, fit.motion_likelihood - nominal.motion_likelihood, shapes)
+    return [one for one in left if one.shape.kind != "resonance" or not inquiry.log.has_means], p_value
+
+
 def _left_over(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Rest, list[Shape]]:
     """What forecasts leave over, as innovations show it."""
     by_row, seen = inquiry.fitter.seen_by_row(fit)
     shapes = shapes_of(by_row, seen)
-    left, p_value = significant_leftovers(inquiry, selection, seen, shapes)
+    left, p_value = _left_by_row(inquiry, seen, inquiry.fitter.seen_by_row(selection.nominal)[1], shapes)
     strongest = max(left, key=lambda leftover: leftover.gain) if left else None
     return Rest(fit, strongest, p_value, bool(left), (), np.zeros(0)), shapes

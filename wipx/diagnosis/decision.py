@@ -160,11 +160,12 @@ def _rival_that_transfers(
 
 def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
-    least = _least_gains(inquiry, selection, fit)
+    explained = fit.motion_likelihood - selection.nominal.motion_likelihood
+    least = _least_gains(inquiry, fit, explained)
     other = _other_law(inquiry, selection, fit, least["force"])
     if other is not None:
         return other
-    left, p_value = significant_leftovers(inquiry, selection, fit, shapes)
+    left, p_value = significant_leftovers(inquiry, fit, explained, shapes)
     if not left and not _is_far_off(inquiry, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
     strongest = max(left, key=lambda leftover: leftover.gain) if left else None
@@ -190,19 +191,25 @@ def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Sha
 
 
 def significant_leftovers(
-    inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]
+    inquiry: Inquiry, fit: Fit, explained: float, shapes: list[Shape]
 ) -> tuple[list[Leftover], float]:
-    """Leftovers of a fit that are no chance, and large enough; and the p value that there is none."""
+    """Leftovers of a fit by innovations that are no chance, and large enough; and the p value that there is none.
+
+    Args:
+        inquiry: The means.
+        fit: By innovations.
+        explained: What it explains [nats].
+        shapes: In which they are looked for.
+    """
     found = leftovers(inquiry.by_row, fit, shapes)
     p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
-    least = _least_gains(inquiry, selection, fit)
+    least = _least_gains(inquiry, fit, explained)
     return _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT), p_value
 
 
-def _least_gains(inquiry: Inquiry, selection: Selection, fit: Fit) -> dict[str, float]:
-    """What a leftover of each kind must gain [nats]."""
-    share = rough.SHARE if rough.is_rough(fit) else LEFTOVER_SHARE
-    share *= fit.motion_likelihood - selection.nominal.motion_likelihood
+def _least_gains(inquiry: Inquiry, fit: Fit, explained: float) -> dict[str, float]:
+    """What a leftover of each kind must gain beside a fit that explains so much [nats]."""
+    share = (rough.SHARE if rough.is_rough(fit) else LEFTOVER_SHARE) * explained
     factor = BESIDE_MEANS if inquiry.log.has_means else 1.0
     curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}

@@ -1,0 +1,77 @@
+"""Evidence of several horizons: its likelihood, and what it finds where forces wander."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis.recorded import SIMULATOR, Bench, bench
+
+from wipx.core.model import ModelBatch
+from wipx.core.recording import Recording
+from wipx.diagnosis.case import Robot, diagnose
+from wipx.diagnosis.forecasts import ForecastFitter
+from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.selection import Selection
+
+FRICTION = {"translation/coulomb": {"F_c": 1.0}}
+
+
+def forecasts(case: Bench) -> ForecastFitter:
+    return ForecastFitter(case.fitter, case.quiet)
+
+
+def shaken(case: Bench, rng: np.random.Generator) -> Bench:
+    """The same runs under a force that wanders, as of a cable: what is recorded of the command lacks it."""
+    recordings = []
+    for r in case.recordings:
+        wander = np.zeros(len(r))
+        for k in range(1, len(r)):
+            wander[k] = 0.98 * wander[k - 1] + 0.2 * 0.15 * np.std(r["u"]) * rng.normal()
+        recordings.append(Recording(r.name, {**r.columns, "u": r["u"] + wander}, r.source, r.periods))
+    return replace(case, recordings=tuple(recordings))
+
+
+def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    fitter = forecasts(case)
+    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
+    found = Selection(fitter, case.setting, nominal).run()
+    assert {effect.partition("/")[0] for effect in found.effects} == {"translation"}
+    level = next(v for name, v in found.hypothesis.values.items() if name.endswith((".F_c", ".F_s")))
+    assert level == pytest.approx(1.0, rel=0.3)
+
+
+def test_nothing_is_asked_for_where_the_nominal_model_is_right(fresh_seed: int):
+    case = bench("linear_axis", {}, fresh_seed, count=3)
+    fitter = forecasts(case)
+    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
+    assert Selection(fitter, case.setting, nominal).run().effects == ()
+
+
+def test_half_the_squares_of_white_errors_are_the_loss_of_likelihood(fresh_seed: int):
+    case = bench("pendulum", {"pitch/coulomb": {"F_c": 0.1}}, fresh_seed)
+    fitter = forecasts(case)
+    fit = fitter.begun(Hypothesis.of(case.setting, ("pitch/viscous",), {}))
+    apart = fitter.by_recording(fit, fit.white)
+    assert apart.sum() == pytest.approx(fit.log_likelihood, abs=0.5)
+    np.testing.assert_allclose(fitter.white_of(fit, ModelBatch(fit.hypothesis.model))[0], fit.white.ravel(), atol=1e-9)
+
+
+def test_a_recording_that_is_left_out_does_not_count(fresh_seed: int):
+    case = bench("linear_axis", FRICTION, fresh_seed)
+    fitter = forecasts(case)
+    others = fitter.without(0)
+    assert others.rows < fitter.rows
+    fit = others.begun(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    assert others.by_recording(fit, fit.white)[0] == 0.0
+
+
+def test_what_stays_is_told(fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    answer = diagnose(case.recordings, Robot(case.nominal, {}), SIMULATOR)
+    left = answer.remainder
+    assert left is not None
+    assert 0.0 < left.share_gone <= 1.0
+    assert left.forces[0].site == "translation"
+    assert left.forces[0].size > 0.0
+    assert any(effect.name.startswith("translation/") for effect in answer.effects)

@@ -1,0 +1,59 @@
+"""Where predictions start: smoothed states follow right models closely, forgive wrong ones, and know no future."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identify.emulated_robot import Robot, nominal_model
+
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.identify.smoothing import BANDWIDTHS, Smoother
+from wipx.identify.windows import LOOK_AHEAD
+from wipx.sim.analytic import AnalyticSimulator
+
+SIMULATOR = AnalyticSimulator(threads=1)
+KINDS = ("wip", "pendulum", "linear_axis", "double_pendulum")
+WRONG = {"linear_axis": {"translation/coulomb": {"F_c": 1.0}}, "pendulum": {"pitch/coulomb": {"F_c": 0.2}}}
+
+
+def recorded(kind: str, effects, seed: int, duration: float = 3.0):
+    return Robot(nominal_model(kind).with_effects(effects), duration).record(np.random.default_rng(seed), 2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_later_row_than_the_look_ahead_changes_a_state(kind: str, fresh_seed: int):
+    model, recordings = nominal_model(kind), recorded(kind, {}, fresh_seed)
+    noise = sensor_noise(recordings, model.plant)
+    bandwidth = [np.full(len(noise), 10.0)]
+    whole = Smoother(SIMULATOR, model.plant, recordings[:1], noise).along(model, bandwidth)
+    t = recordings[0].t
+    cut = int(np.searchsorted(t, 0.5 * t[-1]))
+    part = replace(recordings[0].rows(0, cut + 1), name="part")
+    short = Smoother(SIMULATOR, model.plant, (part,), noise).along(model, bandwidth)
+    known = int(np.searchsorted(t, t[cut] - LOOK_AHEAD - 1e-6))
+    np.testing.assert_allclose(short[:, :known], whole[:, :known], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", WRONG)
+def test_a_wrong_model_predicts_best_from_states_that_hardly_trust_it(kind: str, fresh_seed: int):
+    recordings = recorded(kind, WRONG[kind], fresh_seed)
+    nominal = nominal_model(kind)
+    judge = Judge(SIMULATOR, sensor_noise(recordings, nominal.plant), 0.5)
+    wrong = judge.tuned(nominal, recordings)
+    assert max(wrong.bandwidths.values()) >= 10.0
+    trusted = replace(nominal, bandwidths=dict.fromkeys(nominal.plant.coordinates, BANDWIDTHS[0]))
+    errors = [judge.compare(m, m, recordings, held_out=True)[0].completed for m in (wrong, trusted)]
+    for name in nominal.plant.coordinates:
+        assert errors[0][name] < errors[1][name]
+
+
+def test_a_constant_acceleration_that_the_model_lacks_is_found(fresh_seed: int):
+    force = 2.0
+    recordings = recorded("linear_axis", {"actuator/offset": {"F_0": force}}, fresh_seed)
+    nominal = nominal_model("linear_axis")
+    smoother = Smoother(SIMULATOR, nominal.plant, recordings, sensor_noise(recordings, nominal.plant))
+    missing = smoother.disturbance(nominal, np.array([10.0]))[:, 0]
+    p = nominal.parameters
+    mass = p["body_mass"] + p["wheel_mass"] + p["wheel_inertia"] / p["wheel_radius"] ** 2
+    assert np.median(missing[200 : len(recordings[0])]) == pytest.approx(force / mass, rel=0.1)
