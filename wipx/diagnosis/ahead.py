@@ -52,7 +52,7 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
         return _by_forecasts(inquiry, chosen)[0]
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if inquiry.is_trusted(rest.fit):
+    if not rest.significant and inquiry.is_trusted(rest.fit):
         return by_row
     ahead, lead = _by_forecasts(inquiry, chosen)
     if rest.significant:

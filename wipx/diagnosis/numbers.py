@@ -75,7 +75,7 @@ def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:
         low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
         known = sharpest.get(prospect.effect)
         if known is None or prospect.deviation < known[0]:
-            sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, value + reach, unit))
+            sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, max(value + reach, low), unit))
     return tuple(bound for _, bound in sharpest.values())
 
 
