@@ -33,6 +33,7 @@ from wipx.sim.analytic import AnalyticSimulator
 HORIZON = 0.5  # [s] of the longest prediction, contract section 4
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
 STRIDE = 0.25  # [s] from one start to the next
+SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 LEAD = 0.1  # [s] of smoothed states before a start
 BLOCK = 1.0  # [s] of the stretches whose errors count as independent of each other
 LEVEL = 0.05  # at which any effect is named by chance
@@ -119,7 +120,7 @@ class ForecastFitter(Fitter):
     @property
     def rows(self) -> int:
         """Predictions that do not overlap."""
-        return max(int(self._counted.sum() * self._share), 2)
+        return max(int(self._counted.sum() * SHARE), 2)
 
     @cached_property
     def blocks(self) -> np.ndarray:
@@ -151,11 +152,6 @@ class ForecastFitter(Fitter):
         whole = last >= windows.starts + HORIZON - 1.5 * interval - 1e-6
         return whole & (windows.recording != (-1 if self.log.left_out is None else self.log.left_out))
 
-    @property
-    def _share(self) -> float:
-        """Share of a prediction that counts as independent of its neighbours."""
-        return min(STRIDE / HORIZON, 1.0)
-
     def refined(self) -> "ForecastFitter":
         """The same with half the step of the simulator."""
         return ForecastFitter(self.by_row.refined(), self.first_levels)
@@ -185,7 +181,7 @@ class ForecastFitter(Fitter):
 
     def _likelihoods(self, fit: Fit) -> np.ndarray:
         """Log-likelihood of each prediction, shape (N,)."""
-        scale = self._share * float(np.log(np.diag(fit.noise.whitening)).sum())
+        scale = SHARE * float(np.log(np.diag(fit.noise.whitening)).sum())
         return np.where(self._counted, scale - 0.5 * np.sum(fit.white**2, axis=1), 0.0)
 
     def loosened(self, fit: Fit) -> Anchors:
@@ -227,15 +223,10 @@ class ForecastFitter(Fitter):
         return fit
 
     def _near(self, fit: Fit) -> list[np.ndarray]:
-        """Bandwidths of a fit, and those that differ in one joint or in all."""
+        """Bandwidths of a fit, and those three times larger or smaller in some joints."""
         best = fit.levels.bandwidths
-        factors = (1.0 / 3.0, 1.0, 3.0)
-        if len(best) == 1:
-            return [np.clip(best * factor, BANDWIDTHS[0], BANDWIDTHS[-1]) for factor in factors]
-        found = {
-            tuple(np.clip(best * np.array(pair), BANDWIDTHS[0], BANDWIDTHS[-1])) for pair in product(factors, factors)
-        }
-        return [np.array(each) for each in found]
+        near = best * np.array(list(product((1.0 / 3.0, 1.0, 3.0), repeat=len(best))))
+        return list(np.unique(np.clip(near, BANDWIDTHS[0], BANDWIDTHS[-1]), axis=0))
 
     def errors_of(self, batch: ModelBatch, levels: Anchors, model: Model) -> np.ndarray:
         """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
@@ -281,14 +272,14 @@ class ForecastFitter(Fitter):
             weights = (TAILS + size) / (TAILS + squares)
         determinants = np.log(np.einsum("paa->pa", whitening)).sum(axis=1)
         sums = 0.5 * (TAILS + size) * np.log1p(squares / TAILS).sum(axis=1)
-        likelihoods = self._share * (count * determinants - sums)
+        likelihoods = SHARE * (count * determinants - sums)
         return [Errors(w, float(value)) for w, value in zip(whitening, likelihoods, strict=True)]
 
     def whitened(self, errors: np.ndarray, noise: Errors) -> np.ndarray:
         """White errors, shape (P, N, H joints), half of whose sum of squares is the loss of likelihood."""
         white = errors @ noise.whitening.T
         squares = np.maximum(np.sum(white**2, axis=2, keepdims=True), 1e-12)
-        worth = self._share * (TAILS + white.shape[2]) * np.log1p(squares / TAILS)
+        worth = SHARE * (TAILS + white.shape[2]) * np.log1p(squares / TAILS)
         return white * np.sqrt(worth / squares)
 
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
