@@ -2,9 +2,8 @@
 
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
-So innovations have the first word. The search is repeated by forecasts where the first one leaves something
-significant over, or where its model predicts far above the sensors' floor although it is given all the time that a
-right model needs.
+So innovations come first. The search is repeated by forecasts where the first one leaves something significant over,
+or where its model errs far above the sensors' floor and more than it would if it were right (`Inquiry.is_trusted`).
 """
 
 from dataclasses import dataclass, replace
