@@ -25,7 +25,7 @@ from wipx.diagnosis.experiment import Question, next_experiment
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.heldout import Transfer, judged, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.inquiry import Inquiry
+from wipx.diagnosis.inquiry import FAR_FROM_THE_FLOOR, Inquiry
 from wipx.diagnosis.leftover import Shape
 from wipx.diagnosis.location import located
 from wipx.diagnosis.log import Log
@@ -34,7 +34,7 @@ from wipx.diagnosis.numbers import bounds, estimates, is_wide
 from wipx.diagnosis.remainder import horizon_errors, left_forces
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.selection import Selection
-from wipx.diagnosis.sentence import explained_share, sentence
+from wipx.diagnosis.sentence import explained_share, sentence, times_the_floor
 from wipx.diagnosis.stand_in import curve_of
 from wipx.effects.catalogue import effect_of
 from wipx.sim.simulator import StateFeedback
@@ -55,8 +55,8 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
     ends = estimates(inquiry.fitter, fit, selection.nominal)
     effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
-    matters = not inquiry.is_trusted(fit)
-    left = rest.significant or matters
+    left = rest.significant or not inquiry.is_trusted(fit)
+    matters = left and times_the_floor(fitted) > FAR_FROM_THE_FLOOR
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(inquiry, rest), significant=left)
     as_one = () if rest.significant else combined(inquiry, selection, fit)
@@ -198,7 +198,8 @@ def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
 
 
 def _unexplained(inquiry: Inquiry, rest: Rest) -> Unexplained:
-    beyond = [name for name in rest.fit.effects if effect_of(name, inquiry.log.plant).beyond]
+    laws = {name: effect_of(name, inquiry.log.plant) for name in rest.fit.effects}
+    beyond = [name for name, law in laws.items() if law.beyond and not inquiry.fitter.looks_for(name, law)]
     if rest.significant and beyond:
         words = " and ".join(effect_in_words(name, inquiry.log.plant.kind) for name in beyond)
         return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
