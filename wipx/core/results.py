@@ -19,6 +19,7 @@ class Estimate:
         high: Upper end.
         at_bound: Whether the search stopped at its lower or upper bound.
         meaning: What it is, in words.
+        from_run_to_run: Least and largest value that single recordings ask for; None where one value suits all.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Estimate:
     high: float
     at_bound: bool
     meaning: str
+    from_run_to_run: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

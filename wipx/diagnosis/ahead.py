@@ -51,33 +51,36 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
         return _by_forecasts(inquiry, chosen)[0]
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if not rest.significant and inquiry.is_trusted(rest.fit):
+    enough = inquiry.is_trusted(rest.fit) if rest.fit.effects else inquiry.is_at_the_floor(rest.fit)
+    if not rest.significant and enough:
         return by_row
-    ahead, lead = _by_forecasts(inquiry, chosen)
+    ahead, agrees = _by_forecasts(inquiry, chosen)
     if rest.significant:
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
-    return ahead if lead >= LEAST_GAIN else by_row
+    return by_row if agrees and rest.fit.effects else ahead
 
 
-def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, float]:
-    """What forecasts find to be missing, and how far that leads what innovations chose [nats].
+def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, bool]:
+    """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
 
     A second search starts from what innovations chose; the likelier end counts.
     """
-    fitter, setting = ForecastFitter(inquiry.by_row, inquiry.first_levels), inquiry.setting
+    setting = inquiry.setting
+    fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, setting.doubted())
     ahead = replace(inquiry, fitter=fitter)
     nominal = fitter.begun(Hypothesis.of(setting, (), {}))
-    selection = Selection(fitter, setting, nominal, ahead.transfers)
+    selection = Selection(fitter, setting, nominal)
     best = selection.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
-    same = fitter.polished(fitter.fit(start, best.levels)) if chosen.effects else nominal
-    if chosen.effects and set(chosen.effects) != set(best.effects):
-        other = selection.pruned(same)
-        if selection.score(other, nominal) > selection.score(best, nominal):
-            best = selection.exchanged(other)
+    same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
+    if not selection.worthwhile(nominal, same):
+        same = nominal
+    if set(same.effects) != set(best.effects) and selection.score(same, nominal) > selection.score(best, nominal):
+        best = selection.exchanged(same)
     lead = selection.score(best, nominal) - selection.score(same, nominal)
+    agrees = set(same.effects) == set(chosen.effects) and lead < LEAST_GAIN
     ahead = ahead.trusting(best)
-    return Found(ahead, selection, *_left_over(ahead, selection, best)), lead
+    return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
 
 
 def _left_by_row(inquiry: Inquiry, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Leftover], float]:

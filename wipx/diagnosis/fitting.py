@@ -140,6 +140,11 @@ class Fitter(ABC):
     def blocks(self) -> np.ndarray:
         """Number of the stretch of time to which each white error belongs, shape of `Fit.white`."""
 
+    @property
+    @abstractmethod
+    def runs(self) -> np.ndarray:
+        """Number of the recording to which each white error belongs, shape of `Fit.white`."""
+
     @abstractmethod
     def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Values, and what is else held fixed, in turn until neither gains more."""
@@ -153,6 +158,10 @@ class Fitter(ABC):
             larger: The larger fit.
             explained: What the smaller one explains already [nats].
         """
+
+    @abstractmethod
+    def holds(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether what a fit has beside a smaller one shows in recordings that it was not fitted to."""
 
     @abstractmethod
     def loosened(self, fit: Fit) -> Any:
@@ -173,6 +182,10 @@ class Fitter(ABC):
     @abstractmethod
     def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
         """A fit as its innovations show it, and what fits by innovations."""
+
+    @abstractmethod
+    def sketched_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """The same with noise that need not suit it best: enough for first guesses."""
 
     @abstractmethod
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:

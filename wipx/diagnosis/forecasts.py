@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import stdtrit
@@ -21,7 +22,7 @@ from scipy.special import stdtrit
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
-from wipx.diagnosis.hypothesis import Hypothesis
+from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
@@ -36,9 +37,11 @@ STRIDE = 0.25  # [s] from one start to the next
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 LEAD = 0.1  # [s] of smoothed states before a start
 BLOCK = 1.0  # [s] of the stretches whose errors count as independent of each other
-LEVEL = 0.05  # at which any effect is named by chance
+LEVEL = 0.1  # at which any effect is named by chance
 TAILS = 5.0  # degrees of freedom of the errors' distribution
 ROUNDS = 12  # of the search for their covariance
+PARTS = 6  # of the stretches, each predicted by numbers that suit the others
+DAMPED = 1e-3  # relative, of the step to these numbers
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
 MACHINE = ("offset", "load_friction")  # kinds that section 6 of the contract has beside those of section 3
 STEP = 2.0  # times the simulator's usual step, exact enough where no law is
@@ -80,8 +83,11 @@ class ForecastFitter(Fitter):
     """Fits hypotheses to predictions at several horizons.
 
     Attributes:
+        horizons: After the rows that a start is estimated from [s]; 0 for one row.
         by_row: Fits the same recordings by innovations.
         first_levels: A first guess of the noise, as innovations have it.
+        levels_by_row: The noise of what innovations chose.
+        doubted: The robot, none of whose numbers is quite exact; an effect must hold beside that.
     """
 
     considered = 12
@@ -90,9 +96,13 @@ class ForecastFitter(Fitter):
     steps = 3
     unproven = 0
     richer_by = 8.0
+    horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
     by_row: InnovationFitter
     first_levels: NoiseLevels
+    levels_by_row: NoiseLevels
+    doubted: Setting
+    _doubts: dict[tuple[tuple[str, ...], bytes], np.ndarray] = field(default_factory=dict, compare=False, repr=False)
     _seen: dict[tuple[tuple[str, ...], bytes], Fit] = field(default_factory=dict, compare=False, repr=False)
 
     def looks_for(self, name: str, effect: Effect) -> bool:
@@ -128,6 +138,11 @@ class ForecastFitter(Fitter):
         number = np.floor(self.windows.starts / BLOCK).astype(np.int64) + 1_000_000 * self.windows.recording
         return np.repeat(number[:, None], self._sampled.shape[0] * self.log.joints, axis=1)
 
+    @property
+    def runs(self) -> np.ndarray:
+        """Number of the recording of every error, shape (N, H joints)."""
+        return np.broadcast_to(self.windows.recording[:, None], self.blocks.shape)
+
     @cached_property
     def windows(self) -> Windows:
         """The predictions."""
@@ -138,7 +153,7 @@ class ForecastFitter(Fitter):
         """Row of each window at each horizon, shape (H, N)."""
         t, windows = self.windows.inputs.t, self.windows
         seen = np.sum(t <= windows.starts + LOOK_AHEAD + 1e-6, axis=0)
-        wanted = [np.sum(t < windows.starts + LOOK_AHEAD + horizon - 1e-6, axis=0) for horizon in HORIZONS]
+        wanted = [np.sum(t < windows.starts + LOOK_AHEAD + horizon - 1e-6, axis=0) for horizon in self.horizons]
         rows = np.stack([np.minimum(np.maximum(row, seen), windows.inputs.last) for row in wanted])
         apart = np.concatenate([[True], np.median(np.diff(rows, axis=0), axis=1) > 0.0])
         return rows[apart]
@@ -154,30 +169,65 @@ class ForecastFitter(Fitter):
 
     def refined(self) -> "ForecastFitter":
         """The same with half the step of the simulator."""
-        return ForecastFitter(self.by_row.refined(), self.first_levels)
+        return replace(self, by_row=self.by_row.refined(), _doubts={}, _seen={})
 
     def without(self, recording: int) -> "ForecastFitter":
         """The same with a recording that does not count."""
-        return ForecastFitter(self.by_row.without(recording), self.first_levels)
+        return replace(self, by_row=self.by_row.without(recording), _doubts={}, _seen={})
 
     def begun(self, hypothesis: Hypothesis) -> Fit:
         """A first fit of a hypothesis, from starts of its own."""
         return self.polished(self.fit(hypothesis, self.anchored(hypothesis.model)))
 
     def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
-        """So much that stretches of time agree that the larger one predicts better (Vuong 1989, Econometrica 57(2)).
+        """Nothing: `holds` asks."""
+        return 0.0
 
-        Student's test on the differences of their likelihoods, at a level for all effects that are looked at together.
+    def holds(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether stretches of time agree that the larger one predicts recordings better that it was not fitted to.
+
+        Student's test on the differences of their likelihoods (Vuong 1989, Econometrica 57(2)), at a level for all
+        effects that are looked at together.
         """
-        stretch = np.unique(self.blocks[:, 0], return_inverse=True)[1].ravel()
-        differences = np.bincount(stretch, self._likelihoods(larger) - self._likelihoods(smaller))
-        kept = differences[np.bincount(stretch, self._counted) > 0]
+        differences = np.bincount(self._stretch, self._held_out(larger) - self._held_out(smaller))
+        kept = differences[np.bincount(self._stretch, self._counted) > 0]
         count = len(kept)
         if count < 2:
-            return np.inf
+            return False
         looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
         reach = -float(stdtrit(count - 1, LEVEL / looked_at))
-        return max(LEAST_GAIN, reach * float(np.sqrt(count) * np.std(kept, ddof=1)))
+        chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
+        return float(kept.sum()) >= max(LEAST_GAIN, chance)
+
+    @cached_property
+    def _stretch(self) -> np.ndarray:
+        """Number of the stretch of time in which each prediction starts, shape (N,)."""
+        return np.unique(self.blocks[:, 0], return_inverse=True)[1].ravel()
+
+    def _held_out(self, fit: Fit) -> np.ndarray:
+        """Log-likelihood of each prediction by the numbers that suit other stretches, shape (N,)."""
+        key = _key(fit)
+        if key not in self._doubts:
+            begun = Hypothesis.of(self.doubted, fit.effects, fit.hypothesis.values)
+            self._doubts[key] = self._judged_by_others(self.polished(self.fit(begun, fit.levels), rounds=1))
+        return self._doubts[key]
+
+    def _judged_by_others(self, fit: Fit) -> np.ndarray:
+        part = self._stretch % PARTS
+        cubes = np.stack([self._by_others(fit, part == k) for k in range(PARTS)])
+        white = self.white_of(fit, fit.hypothesis.space.batch(cubes)).reshape(PARTS, *fit.white.shape)
+        return self._likelihoods(replace(fit, white=white[part, np.arange(self.windows.count)]))
+
+    def _by_others(self, fit: Fit, left_out: np.ndarray) -> np.ndarray:
+        """Position in the cube that suits all predictions but some (N,), by one Gauss-Newton step, shape (D,)."""
+        cube = fit.hypothesis.cube
+        here = np.flatnonzero(np.repeat(left_out, fit.white.shape[1]))
+        jacobian = fit.jacobian[here]
+        scale = np.sqrt(np.maximum(np.diag(fit.information), 1e-12))
+        slope = fit.slope - jacobian.T @ fit.white.ravel()[here]
+        normal = (fit.information - jacobian.T @ jacobian) / np.outer(scale, scale) + DAMPED * np.eye(len(cube))
+        step = -np.linalg.solve(normal, slope / scale) / scale
+        return np.clip(cube + np.where(fit.free, step, 0.0), 0.0, 1.0)
 
     def _likelihoods(self, fit: Fit) -> np.ndarray:
         """Log-likelihood of each prediction, shape (N,)."""
@@ -194,11 +244,15 @@ class ForecastFitter(Fitter):
 
     def seen_by_row(self, fit: Fit) -> tuple[InnovationFitter, Fit]:
         """A fit as its innovations show it."""
-        key = (fit.hypothesis.space.names, fit.hypothesis.cube.tobytes())
+        key = _key(fit)
         if key not in self._seen:
-            begun = self.by_row.fit(fit.hypothesis, self.first_levels, steps=0)
+            begun = self.sketched_by_row(fit)[1]
             self._seen[key] = self.by_row.fit(fit.hypothesis, self.by_row.levels_of(begun), steps=0)
         return self.by_row, self._seen[key]
+
+    def sketched_by_row(self, fit: Fit) -> tuple[InnovationFitter, Fit]:
+        """The same with the noise of what innovations chose."""
+        return self.by_row, self.by_row.fit(fit.hypothesis, self.levels_by_row, steps=0)
 
     def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
         """Starts by the model, of the filter from which its predictions are likeliest."""
@@ -286,3 +340,8 @@ class ForecastFitter(Fitter):
         """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""
         values = self._likelihoods(replace(fit, white=white))
         return np.bincount(self.windows.recording, values, minlength=len(self.log.recordings))
+
+
+def _key(fit: Fit) -> tuple[tuple[str, ...], bytes]:
+    """What tells fits of the same recordings apart."""
+    return fit.hypothesis.space.names, fit.hypothesis.cube.tobytes()

@@ -10,6 +10,9 @@ from wipx.core.parameters import Scales
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
 
+UNDECLARED = 0.01  # relative standard deviation of a rigid body's numbers that are listed as exact
+GIVEN = ("gravity",)  # numbers that are exact
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -32,6 +35,11 @@ class Setting:
         if not effects and not self.uncertainty:
             return ParameterSpace(prepared, ())
         return parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
+
+    def doubted(self) -> "Setting":
+        """The same robot, none of whose numbers is quite exact: those of a real machine never are."""
+        body = {name: UNDECLARED for name, value in self.nominal.parameters.items() if value and name not in GIVEN}
+        return replace(self, uncertainty={**body, **self.uncertainty})
 
 
 @dataclass(frozen=True)

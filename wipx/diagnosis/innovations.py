@@ -68,6 +68,11 @@ class InnovationFitter(Fitter):
         """Number of the stretch of time of every innovation, shape (R, m, K + 1)."""
         return np.repeat(stretches(self.log)[:, None], self.log.signals, axis=1)
 
+    @property
+    def runs(self) -> np.ndarray:
+        """Number of the recording of every innovation, shape (R, m, K + 1)."""
+        return np.broadcast_to(np.arange(len(self.blocks))[:, None, None], self.blocks.shape)
+
     def refined(self) -> "InnovationFitter":
         """The same with half the step of the simulator."""
         return InnovationFitter(
@@ -84,11 +89,19 @@ class InnovationFitter(Fitter):
         share = rough.SHARE if rough.leaves_open(smaller, added) else LEAST_SHARE
         return max(LEAST_GAIN, min(share * explained, MOST_ASKED))
 
+    def holds(self, smaller: Fit, larger: Fit) -> bool:
+        """Always: where laws hold, their likelihood says all."""
+        return True
+
     def loosened(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
         return replace(fit.levels, force=LOUDER * fit.levels.force)
 
     def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """The fit itself."""
+        return self, fit
+
+    def sketched_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
         """The fit itself."""
         return self, fit
 

@@ -63,15 +63,19 @@ class Inquiry:
         tuned = self.judge.tuned(fit.hypothesis.model, self.recordings)
         return replace(self, judge=replace(self.judge, bandwidths=tuned.bandwidths))
 
+    def is_at_the_floor(self, fit: Fit) -> bool:
+        """Whether a fit predicts about as well as sensor noise lets a right model predict."""
+        return times_the_floor(self.errors(fit)) <= FAR_FROM_THE_FLOOR
+
     def is_trusted(self, fit: Fit) -> bool:
         """Whether a fit predicts like a right model: at the floor, or well from states estimated with trust in it.
 
         A sensor's noise that lasts makes errors larger than the floor, which knows of white noise only; but a right
         model then predicts about as well from a filter that trusts it as from any other.
         """
-        errors = self.errors(fit)
-        if times_the_floor(errors) <= FAR_FROM_THE_FLOOR:
+        if self.is_at_the_floor(fit):
             return True
+        errors = self.errors(fit)
         trusting = dict.fromkeys(self.log.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed

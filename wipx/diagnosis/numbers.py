@@ -11,8 +11,10 @@ from wipx.core.results import Estimate
 from wipx.diagnosis.fitting import Fit, Fitter
 from wipx.diagnosis.robust import covariance
 from wipx.diagnosis.rough import alike
+from wipx.diagnosis.runs import Scatter, scatter_of
 from wipx.diagnosis.screening import Prospect
 from wipx.effects.catalogue import effect_of
+from wipx.identify.parameter_space import ParameterSpace
 
 NINETY_FIVE = 1.96  # standard deviations
 LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
@@ -25,7 +27,9 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     """Every number of a fit with its 95 % interval."""
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     values = space.to_values(cube)
-    deviation = deviations(fitter, fit, nominal)
+    moving = scatter_of(fit, fitter.runs)
+    between = np.array([moving[i].deviation if i in moving else 0.0 for i in range(len(cube))])
+    deviation = np.hypot(deviations(fitter, fit, nominal), between)
     as_good = alike(fitter, fit, _explained(fit, nominal))
     low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
     high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
@@ -41,10 +45,20 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
             (p.high if blind[i] else float(high[i])) - turns,
             bool(cube[i] <= 0.0 or cube[i] >= 1.0),
             _meaning(space.model, p.name),
+            _ends(space, cube, i, moving[i]) if i in moving else None,
         )
         for i, p in enumerate(space.free)
         for turns in [_whole_turns(p.name, float(values[i]))]
     )
+
+
+def _ends(space: ParameterSpace, cube: np.ndarray, index: int, moving: Scatter) -> tuple[float, float]:
+    """Least and largest value of a number that moves from run to run."""
+    low, high = (
+        float(space.to_values(np.where(np.arange(len(cube)) == index, end, cube))[index])
+        for end in (moving.low, moving.high)
+    )
+    return low, high
 
 
 def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:

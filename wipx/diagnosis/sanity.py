@@ -22,9 +22,12 @@ from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.diagnosis.selection import Selection
 from wipx.diagnosis.whiteness import LARGEST
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
 
+HORIZON = 0.5  # [s] of predictions, contract section 4
 PROBE_SPAN = 3.0  # [s] of a recording; a gross error shows in every second of it
 PROBE_RECORDINGS = 4
 ROUNDS = 3  # of noise levels and values in turn
@@ -81,7 +84,8 @@ class Slip:
 def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
     """Refuse a robot.yaml that the recordings contradict grossly.
 
-    The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside.
+    The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside;
+    without it the nominal model must predict half a second better, too.
 
     Args:
         fitter: Of the recordings.
@@ -102,7 +106,7 @@ def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, be
         return
     believed = max(probe.nominal_likelihood, probe.likelihood_with(best))
     gain = (case.best_likelihood() - believed) / probe.values
-    if gain > OVERWHELMING:
+    if gain > OVERWHELMING and case.relative_error < probe.relative_error:
         raise InputError(
             f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from "
             f"row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {slip.remedy}"
@@ -234,6 +238,15 @@ class _Case:
     def nominal_likelihood(self) -> float:
         """Log-likelihood with the nominal model, of the recordings in the units that they were logged in."""
         return self._likelihood(self.nominal)
+
+    @property
+    def relative_error(self) -> float:
+        """Root mean square error of the nominal model's predictions, over the spread of each coordinate."""
+        recordings, model = self.fitter.log.recordings, self.setting.nominal
+        judge = Judge(self.fitter.simulator, sensor_noise(recordings, model.plant), HORIZON)
+        errors = judge.compare(model, model, recordings, held_out=False)[0].completed
+        spread = {name: max(float(np.ptp(r[name])) for r in recordings) for name in errors}
+        return float(np.sqrt(np.mean([(error / spread[name]) ** 2 for name, error in errors.items()])))
 
     def likelihood_with(self, other: Fit) -> float:
         """The same with the effects of another fit."""

@@ -139,7 +139,7 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
 
 def _scanned(scan: Scan, fitter: Fitter, fit: Fit) -> np.ndarray:
     """First guesses of an effect from how innovations answer to forces at single rows."""
-    by_row, seen = fitter.seen_by_row(fit)
+    by_row, seen = fitter.sketched_by_row(fit)
     return scan(by_row, seen, basis_of(seen))
 
 

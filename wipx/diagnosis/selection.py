@@ -108,7 +108,7 @@ class Selection:
 
     def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
-        return self.evidence(smaller, larger) >= self.needed(smaller, larger)
+        return self.evidence(smaller, larger) >= self.needed(smaller, larger) and self.fitter.holds(smaller, larger)
 
     def needed(self, smaller: Fit, larger: Fit) -> float:
         """Evidence that the effects which `larger` has beside those of `smaller` must gain [nats]."""

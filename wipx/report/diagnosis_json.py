@@ -65,7 +65,10 @@ def _effect(effect: FoundEffect) -> dict[str, object]:
 
 
 def _value(number: Estimate) -> dict[str, object]:
-    return {"value": float(number.value), "ci95": [float(number.low), float(number.high)], "unit": number.unit}
+    found = {"value": float(number.value), "ci95": [float(number.low), float(number.high)], "unit": number.unit}
+    if number.from_run_to_run is not None:
+        found["from_run_to_run"] = [float(end) for end in number.from_run_to_run]
+    return found
 
 
 def _location(location: Location) -> dict[str, object]:

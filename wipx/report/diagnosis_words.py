@@ -70,9 +70,17 @@ def symbol_of(name: str) -> str:
 
 
 def value_in_words(estimate: Estimate) -> str:
-    """A number, its unit and its 95 % interval, e.g. "F_c = 3.10 N [2.93, 3.29]"."""
+    """A number, its unit, its 95 % interval and how it moves, e.g. "F_c = 3.10 N [2.93, 3.29]"."""
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    return f"{symbol_of(estimate.name)} = {shown_value(estimate)}{unit} {shown_interval(estimate)}"
+    return f"{symbol_of(estimate.name)} = {shown_value(estimate)}{unit} {shown_interval(estimate)}{_moving(estimate)}"
+
+
+def _moving(estimate: Estimate) -> str:
+    """From where to where a number moves from run to run."""
+    if estimate.from_run_to_run is None:
+        return ""
+    low, high = estimate.from_run_to_run
+    return f", {compact(low)} to {compact(high)} from run to run"
 
 
 def shown_value(estimate: Estimate) -> str:

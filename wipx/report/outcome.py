@@ -153,6 +153,9 @@ def remark(estimate: Estimate) -> str:
         remarks.append("interval includes the value before: the change is not significant")
     elif estimate.high - estimate.low > abs(estimate.value):
         remarks.append("weakly determined: the interval is wider than the value")
+    if estimate.from_run_to_run is not None:
+        low, high = estimate.from_run_to_run
+        remarks.append(f"moves from {compact(low)} to {compact(high)} from run to run")
     return "; ".join(remarks)
 
 
