@@ -3,7 +3,8 @@
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
 So innovations come first. The search is repeated by forecasts where the first one leaves something significant over,
-or where its model errs far above the sensors' floor and more than it would if it were right (`Inquiry.is_trusted`).
+or where its model errs far above the sensors' floor. There innovations keep the word if their model errs no more than a
+right one would (`Inquiry.is_trusted`) and forecasts find none that predicts better.
 """
 
 from dataclasses import dataclass, replace
@@ -48,20 +49,35 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     shapes = shapes_of(inquiry.by_row, chosen)
     left, _ = _left_by_row(inquiry, chosen, selection.nominal, shapes)
     if left:
-        return _by_forecasts(inquiry, chosen)[0]
+        return _by_forecasts(inquiry, chosen).found
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    enough = inquiry.is_trusted(rest.fit) if rest.fit.effects else inquiry.is_at_the_floor(rest.fit)
-    if not rest.significant and enough:
+    if not rest.significant and inquiry.is_at_the_floor(rest.fit):
         return by_row
-    ahead, agrees = _by_forecasts(inquiry, chosen)
+    ahead = _by_forecasts(inquiry, chosen)
     if rest.significant:
-        return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
-    return by_row if agrees and rest.fit.effects else ahead
+        return replace(ahead.found, rest=replace(ahead.found.rest, significant=True, p_value=rest.p_value))
+    unbeaten = ahead.agrees or (inquiry.is_trusted(rest.fit) and not ahead.beats)
+    return by_row if rest.fit.effects and unbeaten else ahead.found
 
 
-def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, bool]:
-    """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
+@dataclass(frozen=True)
+class _Ahead:
+    """What a search by forecasts ends with.
+
+    Attributes:
+        found: What is missing.
+        agrees: Whether all of what innovations chose is worth it, and nothing else much better.
+        beats: Whether it predicts better than what innovations chose.
+    """
+
+    found: Found
+    agrees: bool
+    beats: bool
+
+
+def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> _Ahead:
+    """What forecasts find to be missing.
 
     A second search starts from what innovations chose; the likelier end counts.
     """
@@ -72,7 +88,8 @@ def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, bool]:
     selection = Selection(fitter, setting, nominal)
     best = selection.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
-    same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
+    whole = fitter.polished(fitter.fit(start, best.levels)) if chosen.effects else nominal
+    same = selection.pruned(whole) if chosen.effects else nominal
     if not selection.worthwhile(nominal, same):
         same = nominal
     if set(same.effects) != set(best.effects) and selection.score(same, nominal) > selection.score(best, nominal):
@@ -80,7 +97,7 @@ def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> tuple[Found, bool]:
     lead = selection.score(best, nominal) - selection.score(same, nominal)
     agrees = set(same.effects) == set(chosen.effects) and lead < LEAST_GAIN
     ahead = ahead.trusting(best)
-    return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
+    return _Ahead(Found(ahead, selection, *_left_over(ahead, selection, best)), agrees, fitter.holds(whole, best))
 
 
 def _left_by_row(inquiry: Inquiry, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Leftover], float]:

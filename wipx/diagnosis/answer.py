@@ -40,8 +40,7 @@ from wipx.effects.catalogue import effect_of
 from wipx.sim.simulator import StateFeedback
 
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
-CLOSE_CALL = 60.0  # nats within which a rival is fitted with the noise of the answer too
-CLOSE_SHARE = 0.1  # or this share of what the effect gains
+CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
 
 
 def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
@@ -163,7 +162,9 @@ def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tu
             continue
         starts = _starts(inquiry, fit, other, effect, name)
         start = inquiry.fitter.likeliest(starts, fit.levels, 1)[0]
-        close = selection.evidence(other, fit) < max(CLOSE_CALL, CLOSE_SHARE * selection.evidence(base, fit))
+        close = selection.evidence(other, fit) < max(
+            inquiry.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
+        )
         if close or start is not starts[0]:
             again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
             other = max(other, again, key=lambda found: found.log_likelihood)

@@ -106,6 +106,7 @@ class Fitter(ABC):
         worthless: Expected gain below which none is [nats].
         steps: Levenberg-Marquardt steps from each start of an effect.
         unproven: Effects that need not transfer to held-out recordings, at most.
+        close_call: Evidence within which a rival of an effect is fitted to the end [nats].
         richer_by: Lead that a rich law must have over the simple one that it contains [nats].
     """
 
@@ -114,6 +115,7 @@ class Fitter(ABC):
     worthless: ClassVar[float]
     steps: ClassVar[int]
     unproven: ClassVar[int]
+    close_call: ClassVar[float]
     richer_by: ClassVar[float]
 
     @abstractmethod

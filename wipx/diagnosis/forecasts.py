@@ -40,6 +40,7 @@ BLOCK = 1.0  # [s] of the stretches whose errors count as independent of each ot
 LEVEL = 0.1  # at which any effect is named by chance
 TAILS = 5.0  # degrees of freedom of the errors' distribution
 ROUNDS = 12  # of the search for their covariance
+DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are fitted
 PARTS = 6  # of the stretches, each predicted by numbers that suit the others
 DAMPED = 1e-3  # relative, of the step to these numbers
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
@@ -95,6 +96,7 @@ class ForecastFitter(Fitter):
     worthless = -np.inf
     steps = 3
     unproven = 0
+    close_call = 20.0
     richer_by = 8.0
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
@@ -209,7 +211,7 @@ class ForecastFitter(Fitter):
         key = _key(fit)
         if key not in self._doubts:
             begun = Hypothesis.of(self.doubted, fit.effects, fit.hypothesis.values)
-            self._doubts[key] = self._judged_by_others(self.polished(self.fit(begun, fit.levels), rounds=1))
+            self._doubts[key] = self._judged_by_others(self.fit(begun, fit.levels, steps=DOUBTS))
         return self._doubts[key]
 
     def _judged_by_others(self, fit: Fit) -> np.ndarray:

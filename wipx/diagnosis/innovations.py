@@ -40,6 +40,7 @@ class InnovationFitter(Fitter):
     worthless = 3.0
     steps = 5
     unproven = 4  # small ones easily fill up what nothing explains
+    close_call = 60.0
     richer_by = 4.0
 
     follower: Follower

@@ -12,6 +12,7 @@ from scipy.special import fdtrc
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.robust import sums_over
 
+UNSEEN = 1e-6  # information below which a recording says nothing of a number
 MOVES = 1e-3  # p value below which a number that stays is no explanation
 
 
@@ -37,6 +38,8 @@ def scatter_of(fit: Fit, runs: np.ndarray) -> dict[int, Scatter]:
         fit: Of several recordings.
         runs: Number of the recording of every white error, shape of `Fit.white`.
     """
+    if not len(fit.hypothesis.cube):
+        return {}
     labels, block = np.unique(fit.blocks, return_inverse=True)
     jacobian, white, run = fit.jacobian[: fit.white.size], fit.white.ravel(), runs.ravel()
     block, count = block.ravel(), int(run.max()) + 1
@@ -45,14 +48,12 @@ def scatter_of(fit: Fit, runs: np.ndarray) -> dict[int, Scatter]:
     informed = sums_over(block, jacobian**2)
     scores = sums_over(block, jacobian * white[:, None])
     information = sums_over(of_block, informed)
-    shifts = -sums_over(of_block, scores) / np.maximum(information, 1e-300)
+    shifts = -sums_over(of_block, scores) / np.maximum(information, UNSEEN)
     chance = sums_over(of_block, (scores + informed * shifts[of_block]) ** 2)  # scores at each run's own value
-    variances = np.maximum(chance, information) / np.maximum(information, 1e-300) ** 2
+    variances = np.maximum(chance, information) / np.maximum(information, UNSEEN) ** 2
     found = {}
     for i in np.flatnonzero(fit.free):
-        seen = information[:, i] > 0.0
-        if np.count_nonzero(seen) < 2:
-            continue
+        seen = information[:, i] > UNSEEN
         scatter = _scatter(shifts[seen, i], variances[seen, i], len(labels) - count)
         if scatter is not None:
             here = float(fit.hypothesis.cube[i])
@@ -62,10 +63,12 @@ def scatter_of(fit: Fit, runs: np.ndarray) -> dict[int, Scatter]:
 
 def _scatter(values: np.ndarray, variances: np.ndarray, spare: int) -> Scatter | None:
     """How values scatter beyond their variances, which `spare` degrees of freedom tell; None where that is chance."""
+    if spare < 1 or len(values) < 2:
+        return None
     weights = 1.0 / variances
     mean = float(np.sum(weights * values) / weights.sum())
     squares, others = float(np.sum(weights * (values - mean) ** 2)), len(values) - 1
-    if spare < 1 or fdtrc(others, spare, squares / others) > MOVES:
+    if fdtrc(others, spare, squares / others) > MOVES:
         return None
     between = (squares - others) / float(weights.sum() - np.sum(weights**2) / weights.sum())
     trusted = mean + (values - mean) * between / (between + variances)
