@@ -21,6 +21,7 @@ from scipy.special import stdtrit
 
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
+from wipx.core.recording import Recording
 from wipx.diagnosis.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
 from wipx.diagnosis.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.innovations import InnovationFitter
@@ -33,6 +34,7 @@ from wipx.sim.analytic import AnalyticSimulator
 
 HORIZON = 0.5  # [s] of the longest prediction, contract section 4
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
+SPACING = 0.005  # [s] of rows, at most; faster logs are condensed
 STRIDE = 0.25  # [s] from one start to the next
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 LEAD = 0.1  # [s] of smoothed states before a start
@@ -146,9 +148,13 @@ class ForecastFitter(Fitter):
         return np.broadcast_to(self.windows.recording[:, None], self.blocks.shape)
 
     @cached_property
+    def _recordings(self) -> tuple[Recording, ...]:
+        return tuple(condensed(recording, self.log.plant.commands) for recording in self.log.recordings)
+
+    @cached_property
     def windows(self) -> Windows:
         """The predictions."""
-        return cut(self.log.recordings, self.log.plant, horizon=HORIZON, lead=LEAD, stride=STRIDE)
+        return cut(self._recordings, self.log.plant, horizon=HORIZON, lead=LEAD, stride=STRIDE)
 
     @cached_property
     def _sampled(self) -> np.ndarray:
@@ -267,7 +273,7 @@ class ForecastFitter(Fitter):
 
     @cached_property
     def _smoother(self) -> Smoother:
-        return Smoother(self.simulator, self.log.plant, self.log.recordings, self.noise)
+        return Smoother(self.simulator, self.log.plant, self._recordings, self.noise)
 
     def polished(self, fit: Fit, *, rounds: int = 2) -> Fit:
         """Starts and values in turn until neither gains more."""
@@ -342,6 +348,25 @@ class ForecastFitter(Fitter):
         """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""
         values = self._likelihoods(replace(fit, white=white))
         return np.bincount(self.windows.recording, values, minlength=len(self.log.recordings))
+
+
+def condensed(recording: Recording, commands: tuple[str, ...]) -> Recording:
+    """Means of an odd number of rows each, at the time of the middle one; commands as they act from there on.
+
+    Many more rows than a joint's motion needs cost time and tell little more of half a second.
+    """
+    every = 1 + 2 * int(0.5 * max(SPACING * recording.rate - 1.0, 0.0))
+    kept = len(recording) // every - 1
+    if every == 1 or kept < 2:
+        return recording
+
+    def means(values: np.ndarray, first: int) -> np.ndarray:
+        return values[first : first + kept * every].reshape(kept, every).mean(axis=1)
+
+    middle = every // 2
+    columns = {name: means(values, middle if name in commands else 0) for name, values in recording.columns.items()}
+    times = {"t": recording.t[middle : middle + kept * every : every]}
+    return Recording(recording.name, {**columns, **times}, recording.source, recording.periods)
 
 
 def _key(fit: Fit) -> tuple[tuple[str, ...], bytes]:
