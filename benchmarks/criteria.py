@@ -18,8 +18,10 @@ from typing import Any
 import numpy as np
 from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
+from omegaconf import OmegaConf
 
 from wipx.concealed.dirty_score import alike
+from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.case import in_two
@@ -127,12 +129,16 @@ def drawn(folder: Path) -> Iterator[Case]:
 
 def rigs() -> Iterator[Case]:
     """The rigs of `+experiment=real_recordings`, with their split."""
+    register()
     with initialize_config_dir(str(CONF), version_base=None):
-        task = compose("config", overrides=["+experiment=real_recordings"]).task
-    for name, settings in task.cases.items():
-        case = instantiate({"_target_": "wipx.tasks.real_recordings.Case", **settings}, _recursive_=False)
-        source = case.of(instantiate(task.sources[settings.dataset]))
-        published = instantiate(settings.published)
+        composed = compose("config", overrides=["+experiment=real_recordings"]).task
+    task: Any = OmegaConf.to_container(composed, resolve=True)
+    for name, settings in task["cases"].items():
+        case = instantiate(
+            {"_target_": "wipx.tasks.real_recordings.Case", **settings}, _recursive_=False, _convert_="all"
+        )
+        source = case.of(instantiate(task["sources"][settings["dataset"]], _convert_="all"))
+        published = instantiate(settings["published"], _convert_="all")
         split, robot = source.split(source.load()), source.describe()
         missing = {main: published.same_physics(main) for main in published.main}
         plausible = (*published.known, *published.plausible)
