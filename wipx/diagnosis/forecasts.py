@@ -43,6 +43,7 @@ LEVEL = 0.1  # at which any effect is named by chance
 TAILS = 5.0  # degrees of freedom of the errors' distribution
 ROUNDS = 12  # of the search for their covariance
 DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are fitted
+MATTERS = 0.05  # nats for each prediction: as if its error at one horizon became 5 % smaller
 PARTS = 6  # of the stretches, each predicted by numbers that suit the others
 DAMPED = 1e-3  # relative, of the step to these numbers
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
@@ -195,7 +196,7 @@ class ForecastFitter(Fitter):
         """Whether stretches of time agree that the larger one predicts recordings better that it was not fitted to.
 
         Student's test on the differences of their likelihoods (Vuong 1989, Econometrica 57(2)), at a level for all
-        effects that are looked at together.
+        effects that are looked at together. In long recordings it must also matter, not only be certain.
         """
         differences = np.bincount(self._stretch, self._held_out(larger) - self._held_out(smaller))
         kept = differences[np.bincount(self._stretch, self._counted) > 0]
@@ -205,7 +206,7 @@ class ForecastFitter(Fitter):
         looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
         reach = -float(stdtrit(count - 1, LEVEL / looked_at))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
-        return float(kept.sum()) >= max(LEAST_GAIN, chance)
+        return float(kept.sum()) >= max(LEAST_GAIN, chance, MATTERS * self.rows)
 
     @cached_property
     def _stretch(self) -> np.ndarray:
