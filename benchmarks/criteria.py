@@ -233,13 +233,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Compare criteria on the same recordings.")
     parser.add_argument("--rigs", action="store_true", help="the rigs of +experiment=real_recordings")
     parser.add_argument("--drawn", type=Path, nargs="*", default=[], help="folders of `wipx.concealed.dirty`")
+    parser.add_argument("--only", nargs="*", default=[], help="names of rigs; all without it")
     parser.add_argument("--out", type=Path, required=True, help="folder that takes the results")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
     kept = arguments.out / "results.jsonl"
     results = [json.loads(line) for line in kept.read_text().splitlines()] if kept.exists() else []
     done = {(result["case"], result["criterion"]) for result in results}
-    cases = [*(rigs() if arguments.rigs else ()), *(case for folder in arguments.drawn for case in drawn(folder))]
+    wanted = [case for case in rigs() if case.name in arguments.only or not arguments.only] if arguments.rigs else []
+    cases = [*wanted, *(case for folder in arguments.drawn for case in drawn(folder))]
     for number, case in enumerate(cases, start=1):
         left = [criterion for criterion in CRITERIA if (case.name, criterion) not in done]
         if not left:

@@ -48,13 +48,14 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     inquiry = inquiry.trusting(chosen)
     shapes = shapes_of(inquiry.by_row, chosen)
     left, _ = _left_by_row(inquiry, chosen, selection.nominal, shapes)
-    if left:
-        return _by_forecasts(inquiry, chosen).found
+    fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, inquiry.setting.doubted())
+    if left and fitter.is_possible:
+        return _by_forecasts(inquiry, fitter, chosen).found
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if not rest.significant and inquiry.is_at_the_floor(rest.fit):
+    if not fitter.is_possible or (not rest.significant and inquiry.is_at_the_floor(rest.fit)):
         return by_row
-    ahead = _by_forecasts(inquiry, chosen)
+    ahead = _by_forecasts(inquiry, fitter, chosen)
     if rest.significant:
         return replace(ahead.found, rest=replace(ahead.found.rest, significant=True, p_value=rest.p_value))
     unbeaten = ahead.agrees or (inquiry.is_trusted(rest.fit) and not ahead.beats)
@@ -76,13 +77,12 @@ class _Ahead:
     beats: bool
 
 
-def _by_forecasts(inquiry: Inquiry, chosen: Fit) -> _Ahead:
+def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> _Ahead:
     """What forecasts find to be missing.
 
     A second search starts from what innovations chose; the likelier end counts.
     """
     setting = inquiry.setting
-    fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, setting.doubted())
     ahead = replace(inquiry, fitter=fitter)
     nominal = fitter.begun(Hypothesis.of(setting, (), {}))
     selection = Selection(fitter, setting, nominal)

@@ -172,9 +172,14 @@ class ForecastFitter(Fitter):
         """Predictions that count: whole ones, of recordings that do, shape (N,)."""
         windows = self.windows
         last = windows.inputs.t[windows.inputs.last, np.arange(windows.count)]
-        interval = float(np.median(self.log.intervals[self.log.intervals > 0.0]))
+        interval = max(float(np.median(np.diff(recording.t))) for recording in self._recordings)
         whole = last >= windows.starts + HORIZON - 1.5 * interval - 1e-6
         return whole & (windows.recording != (-1 if self.log.left_out is None else self.log.left_out))
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether recordings are long enough to compare stretches of time."""
+        return len(np.unique(self._stretch[self._counted])) > 1
 
     def refined(self) -> "ForecastFitter":
         """The same with half the step of the simulator."""
@@ -201,8 +206,6 @@ class ForecastFitter(Fitter):
         differences = np.bincount(self._stretch, self._held_out(larger) - self._held_out(smaller))
         kept = differences[np.bincount(self._stretch, self._counted) > 0]
         count = len(kept)
-        if count < 2:
-            return False
         looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
         reach = -float(stdtrit(count - 1, LEVEL / looked_at))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
