@@ -3,8 +3,7 @@
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
 So innovations come first. The search is repeated by forecasts where the first one leaves something significant over,
-or where its model errs far above the sensors' floor. There innovations keep the word if their model errs no more than a
-right one would (`Inquiry.is_trusted`) and forecasts find none that predicts better.
+or where its laws hold only nearly (`Inquiry.is_trusted`).
 """
 
 from dataclasses import dataclass, replace
@@ -50,35 +49,19 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     left, _ = _left_by_row(inquiry, chosen, selection.nominal, shapes)
     fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, inquiry.setting.doubted())
     if left and fitter.is_possible:
-        return _by_forecasts(inquiry, fitter, chosen).found
+        return _by_forecasts(inquiry, fitter, chosen)[0]
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if not fitter.is_possible or (not rest.significant and inquiry.is_at_the_floor(rest.fit)):
+    if not fitter.is_possible or (not rest.significant and inquiry.is_trusted(chosen)):
         return by_row
-    ahead = _by_forecasts(inquiry, fitter, chosen)
+    ahead, agrees = _by_forecasts(inquiry, fitter, chosen)
     if rest.significant:
-        return replace(ahead.found, rest=replace(ahead.found.rest, significant=True, p_value=rest.p_value))
-    unbeaten = ahead.agrees or (inquiry.is_trusted(rest.fit) and not ahead.beats)
-    return by_row if rest.fit.effects and unbeaten else ahead.found
+        return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
+    return by_row if agrees else ahead
 
 
-@dataclass(frozen=True)
-class _Ahead:
-    """What a search by forecasts ends with.
-
-    Attributes:
-        found: What is missing.
-        agrees: Whether all of what innovations chose is worth it, and nothing else much better.
-        beats: Whether it predicts better than what innovations chose.
-    """
-
-    found: Found
-    agrees: bool
-    beats: bool
-
-
-def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> _Ahead:
-    """What forecasts find to be missing.
+def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
+    """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
 
     A second search starts from what innovations chose; the likelier end counts.
     """
@@ -88,16 +71,15 @@ def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> _Ahe
     selection = Selection(fitter, setting, nominal)
     best = selection.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
-    whole = fitter.polished(fitter.fit(start, best.levels)) if chosen.effects else nominal
-    same = selection.pruned(whole) if chosen.effects else nominal
+    same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
     if not selection.worthwhile(nominal, same):
         same = nominal
     if set(same.effects) != set(best.effects) and selection.score(same, nominal) > selection.score(best, nominal):
         best = selection.exchanged(same)
     lead = selection.score(best, nominal) - selection.score(same, nominal)
-    agrees = set(same.effects) == set(chosen.effects) and lead < LEAST_GAIN
+    agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and lead < LEAST_GAIN
     ahead = ahead.trusting(best)
-    return _Ahead(Found(ahead, selection, *_left_over(ahead, selection, best)), agrees, fitter.holds(whole, best))
+    return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
 
 
 def _left_by_row(inquiry: Inquiry, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Leftover], float]:

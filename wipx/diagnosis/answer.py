@@ -34,7 +34,7 @@ from wipx.diagnosis.numbers import bounds, estimates, is_wide
 from wipx.diagnosis.remainder import horizon_errors, left_forces
 from wipx.diagnosis.robust import inflation
 from wipx.diagnosis.selection import Selection
-from wipx.diagnosis.sentence import explained_share, sentence, times_the_floor
+from wipx.diagnosis.sentence import FAR_OFF, explained_share, sentence, times_the_floor
 from wipx.diagnosis.stand_in import curve_of
 from wipx.effects.catalogue import effect_of
 from wipx.sim.simulator import StateFeedback
@@ -54,7 +54,7 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
     ends = estimates(inquiry.fitter, fit, selection.nominal)
     effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
-    left = rest.significant or not inquiry.is_trusted(fit)
+    left = rest.significant or (times_the_floor(fitted) > FAR_OFF and not inquiry.is_trusted(fit))
     matters = left and times_the_floor(fitted) > FAR_FROM_THE_FLOOR
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(inquiry, rest), significant=left)
