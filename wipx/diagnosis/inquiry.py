@@ -21,7 +21,8 @@ from wipx.sim.analytic import AnalyticSimulator
 
 HORIZON = 0.5  # [s] of predictions, contract section 4
 FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's predictions
-# Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
+# Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In
+# half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
 QUIET = 5e-4
 # Ratio of errors from states that trust a model to those from the best states, beyond which it is wrong: of 24 exact
 # robots one is at 1.51, the others below 1.4.
