@@ -49,7 +49,8 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     repeated = transfer(inquiry.fitter, fit)
     judge = inquiry.judge
     trusted = judge.tuned(nominal, inquiry.recordings)
-    model = replace(fit.hypothesis.model, bandwidths=judge.bandwidths or {})
+    # where nothing is named, predictions learn how far to trust the model, as those of the nominal one do
+    model = replace(fit.hypothesis.model, bandwidths=(judge.bandwidths or {}) if fit.effects else nominal.bandwidths)
     held_out, traces = judged(judge, trusted, repeated.models, inquiry.recordings)
     fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
     ends = estimates(inquiry.fitter, fit, selection.nominal)
