@@ -55,7 +55,7 @@ def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Sh
     fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
     ends = estimates(inquiry.fitter, fit, selection.nominal)
     effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
-    left = rest.significant or (times_the_floor(fitted) > FAR_OFF and not inquiry.is_trusted(fit))
+    left = rest.significant or (times_the_floor(fitted) > FAR_OFF and not inquiry.is_quiet(fit))
     matters = left and times_the_floor(fitted) > FAR_FROM_THE_FLOOR
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(inquiry, rest), significant=left)

@@ -74,9 +74,7 @@ class Inquiry:
         noise that lasts makes errors larger than the floor, which knows of white noise only; but a right model then
         predicts about as well from a filter that trusts it as from any other.
         """
-        levels = self.fitter.seen_by_row(fit)[1].levels
-        usual = np.array([self.setting.scales[site].force for site in self.log.plant.joints])
-        if np.any(levels.force > QUIET * usual):
+        if not self.is_quiet(fit):
             return False
         errors = self.errors(fit)
         if times_the_floor(errors) <= FAR_FROM_THE_FLOOR:
@@ -85,6 +83,12 @@ class Inquiry:
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
         return all(others[name] <= DISTRUSTED * error for name, error in errors.completed.items())
+
+    def is_quiet(self, fit: Fit) -> bool:
+        """Whether a fit asks for no forces but those of its laws, row by row."""
+        levels = self.fitter.seen_by_row(fit)[1].levels
+        usual = np.array([self.setting.scales[site].force for site in self.log.plant.joints])
+        return bool(np.all(levels.force <= QUIET * usual))
 
     def errors(self, fit: Fit) -> FitErrors:
         """Errors of the nominal model and of a fit on the recordings."""
