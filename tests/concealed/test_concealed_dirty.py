@@ -42,8 +42,8 @@ def test_the_dirt_has_the_share_that_was_asked_for(fresh_seed: int):
     for tier in ("dirty", "dirt_only"):
         dirt = drawn(tier, fresh_seed).dirt
         assert dirt is not None
-        assert SHARE[0] <= dirt["share"] <= SHARE[1]  # type: ignore[operator]
-        assert dirt["scale"] <= LARGEST  # type: ignore[operator]
+        assert SHARE[0] <= dirt["share"] <= SHARE[1]
+        assert dirt["scale"] <= LARGEST
 
 
 def test_more_dirt_makes_more_error(monkeypatch: pytest.MonkeyPatch):
@@ -68,8 +68,8 @@ def test_more_dirt_makes_more_error(monkeypatch: pytest.MonkeyPatch):
 def test_every_dominant_effect_matters(case: Case):
     assert case.dirt is not None
     shares = case.dirt["own_shares"]
-    assert set(shares) == set(FRICTION)  # type: ignore[call-overload]
-    assert all(share >= max(OWN, OVER_DIRT * SHARE[0]) for share in shares.values())  # type: ignore[attr-defined]
+    assert set(shares) == set(FRICTION)
+    assert all(share >= max(OWN, OVER_DIRT * SHARE[0]) for share in shares.values())
 
 
 def test_a_robot_with_dirt_only_has_nothing_to_be_named():
@@ -167,7 +167,7 @@ def test_sizes_of_dirt_stay_within_what_is_told(fresh_seed: int):
         assert len(set(dirt.names)) >= 3
         assert all(abs(error) * LARGEST <= 0.02 for error in dirt.errors.values())
         for name, most in (("wander", 0.25), ("wander_place", 0.25), ("wander_load", 0.25), ("uneven", 0.075)):
-            assert all(abs(size) <= most + 1e-12 for size in fields.get(name, {}).values())  # type: ignore[union-attr]
+            assert all(abs(size) <= most + 1e-12 for size in fields.get(name, {}).values())
         assert set(fields) <= set(physics("wip", robot.parameters, Hidden()).dtype.names or ())
 
 

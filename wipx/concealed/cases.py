@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,7 @@ class Case:
     unseen: tuple[Run, ...]
     excitations: tuple[str, ...]
     contrast: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    dirt: Mapping[str, object] | None = None
+    dirt: Mapping[str, Any] | None = None
 
     def noise(self) -> dict[str, float]:
         """Standard deviation of the sensors' noise, with that of their resolution, by coordinate's column."""

@@ -14,6 +14,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -192,7 +193,7 @@ def _log(machine: Machine, course: Course, scenario: Scenario, blemishes: Blemis
 
 def account(
     machine: Machine, there: tuple[str, ...], blemishes: Blemishes, scale: float, errors: Errors
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """What a robot's dirt is, in what JSON can hold.
 
     `own_shares` is what leaving out one dominant effect makes of what leaving out all makes; of a robot with dirt only
@@ -393,8 +394,8 @@ def write_open_cases(folder: Path, cases: int, seed: int, lengths: tuple[float, 
         write_files(place / "visible", files.visible)
         write_files(place / "unseen", files.unseen)
         write_files(place, {"answer.json": json.dumps(files.truth, indent=2)})
-        effects = ", ".join(effect["name"] for effect in files.truth["effects"]) or "nothing"  # type: ignore[index]
-        print(f"{place}: {files.truth['plant']}: {effects}; {files.truth['dirt']['names']}", flush=True)  # type: ignore[index]
+        effects = ", ".join(effect["name"] for effect in files.truth["effects"]) or "nothing"
+        print(f"{place}: {files.truth['plant']}: {effects}; {files.truth['dirt']['names']}", flush=True)
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -22,7 +23,7 @@ class CaseFiles:
 
     visible: Mapping[str, str]
     unseen: Mapping[str, str]
-    truth: Mapping[str, object]
+    truth: Mapping[str, Any]
 
 
 def case_files(case: Case) -> CaseFiles:
@@ -55,7 +56,7 @@ def robot_file(case: Case) -> dict[str, object]:
     return content
 
 
-def truth(case: Case) -> dict[str, object]:
+def truth(case: Case) -> dict[str, Any]:
     """What is hidden, where and when it acts, and how the runs were made."""
     hidden, shown = case.hidden, len(case.visible)
     oddity = hidden.oddity

@@ -28,7 +28,7 @@ from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.effects.catalogue import vocabulary
-from wipx.identify.smoothing import BANDWIDTHS, Smoother, Starts, starts_of
+from wipx.identify.smoothing import BANDWIDTHS, Filter, Smoother, leads_of, starts_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -58,12 +58,12 @@ class Anchors:
 
     Attributes:
         bandwidths: Of the filter that estimates the states, shape (joints,) [rad/s].
-        starts: The states.
+        filter: Itself; the states follow each model.
         spread: Of single commands about their mean: none.
     """
 
     bandwidths: np.ndarray
-    starts: Starts
+    filter: Filter
     spread: float = 0.0
 
 
@@ -269,11 +269,12 @@ class ForecastFitter(Fitter):
     def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
         """Starts by the model, of the filter from which its predictions are likeliest."""
         tried = list(bandwidths) if bandwidths is not None else [np.full(self.log.joints, b) for b in BANDWIDTHS]
-        starts = starts_of(self._smoother, self.windows, model, tried)
-        batch = ModelBatch(model, (), np.zeros((len(tried), 0)))
-        errors = self._errors_from(batch, starts)
+        filters = [self._smoother.filtered(model, bandwidth, leads_of(self.windows)) for bandwidth in tried]
+        if len(tried) == 1:
+            return Anchors(tried[0], filters[0])
+        errors = self._errors_from(ModelBatch(model, (), np.zeros((len(tried), 0))), filters)
         best = int(np.argmax([each.log_likelihood for each in self.noise_of(errors, None, model)]))
-        return Anchors(tried[best], starts.of(np.array([best])))
+        return Anchors(tried[best], filters[best])
 
     @cached_property
     def _smoother(self) -> Smoother:
@@ -296,9 +297,9 @@ class ForecastFitter(Fitter):
 
     def errors_of(self, batch: ModelBatch, levels: Anchors, model: Model) -> np.ndarray:
         """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
-        return self._errors_from(batch, levels.starts)
+        return self._errors_from(batch, [levels.filter])
 
-    def _errors_from(self, batch: ModelBatch, starts: Starts) -> np.ndarray:
+    def _errors_from(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
         windows, sampled = self.windows, self._sampled
         joints, count = self.log.joints, windows.count
         found = np.empty((batch.size, count, len(sampled) * joints))
@@ -306,9 +307,9 @@ class ForecastFitter(Fitter):
         recorded = windows.recorded[sampled, :, np.arange(count)]  # (H, N, joints)
         for begin in range(0, batch.size, size):
             part = np.arange(begin, min(begin + size, batch.size))
-            own = starts if starts.states.shape[2] == 1 else starts.of(part)
             some = ModelBatch(batch.model, batch.names, None if batch.values is None else batch.values[part])
-            path = own.path(some)
+            own = filters if len(filters) == 1 else filters[part[0] : part[-1] + 1]
+            path = starts_by(self._smoother, windows, some, own).path(some)
             shown = self.simulator.replay(some, windows.inputs, path.states[0], path).coordinates
             at = np.stack([shown[rows, :, :, np.arange(count)] for rows in sampled])  # (H, N, joints, P)
             errors = at - recorded[..., None]

@@ -63,7 +63,7 @@ def left_forces(simulator: AnalyticSimulator, log: Log, noise: np.ndarray, model
     plant = log.plant
     smoother = Smoother(simulator, plant, log.recordings, noise)
     bandwidth = np.full(log.joints, BANDWIDTH)
-    states = smoother.along(model, [bandwidth])[0]
+    states = smoother.along(model, bandwidth)
     missing = smoother.disturbance(model, bandwidth)
     linear = linearise_along(model, log.measured[:, : log.joints])
     forces = np.einsum("krij,kjr->kir", np.linalg.inv(linear.b)[linear.place], missing)

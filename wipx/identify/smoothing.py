@@ -31,6 +31,65 @@ FIRST_SPAN = 0.05  # [s] of rows from which the first rates are read
 FEWEST_ROWS = 4  # for the same, at least
 
 
+class Places(NamedTuple):
+    """Some rows of recordings.
+
+    Attributes:
+        rows: Shape (W,).
+        recordings: Whose rows, shape (W,).
+    """
+
+    rows: np.ndarray
+    recordings: np.ndarray
+
+
+class Along(NamedTuple):
+    """A filter along recordings: what it was linearised at, gains, and covariances after each row.
+
+    Attributes:
+        a: Slopes of the accelerations at G places, shape (G, joints, 2 joints).
+        place: Of every row, shape (K + 1, R).
+        gains: From innovations to coordinates, rates and disturbances, shape (K + 1, R, 3 joints, joints).
+        covariance: Of these, after the row, shape (K + 1, R, 3 joints, 3 joints).
+        innovation: Inverse covariance of the innovations, shape (K + 1, R, joints, joints).
+    """
+
+    a: np.ndarray
+    place: np.ndarray
+    gains: np.ndarray
+    covariance: np.ndarray
+    innovation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Filter:
+    """The filter of a model, and what it makes of the rows after a place.
+
+    Attributes:
+        along: Its gains.
+        scale: What the model's sensors show of one unit, shape (joints,).
+        places: Where it smooths.
+        ahead: Gains from innovations of the next M rows to the state at each place, shape (W, M, 2 joints, joints);
+            zero for rows that do not count.
+    """
+
+    along: Along
+    scale: np.ndarray
+    places: Places
+    ahead: np.ndarray
+
+    def smoothed(self, prior: np.ndarray, surprises: np.ndarray) -> np.ndarray:
+        """States at the places, shape (W, 2 joints).
+
+        Args:
+            prior: States at every row before they are corrected there, shape (K + 1, R, 2 joints).
+            surprises: Innovations there, shape (K + 1, R, joints).
+        """
+        found = np.empty((len(self.places.rows), prior.shape[2]))
+        _smooth(self.along.gains, self.ahead, *self.places, prior, surprises, found)
+        return found
+
+
 @dataclass(frozen=True)
 class Smoother:
     """Estimates states along recordings.
@@ -47,26 +106,39 @@ class Smoother:
     recordings: tuple[Recording, ...]
     noise: np.ndarray
 
-    def along(self, model: Model, bandwidths: Sequence[np.ndarray]) -> np.ndarray:
-        """States of a model at every row, by filters of B bandwidths, shape (B, K + 1, 2 joints, R).
+    def along(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
+        """States of a model at every row, shape (K + 1, 2 joints, R); zero after the last one.
 
         Each is estimated from the rows up to `LOOK_AHEAD` later. Coordinates are those of the instant, with bias and
         scale of their sensors and without their delay; rates have that scale too.
 
         Args:
             model: The model.
-            bandwidths: Of each joint's filter, each of shape (joints,) [rad/s].
+            bandwidth: Of each joint's filter, shape (joints,) [rad/s].
         """
-        measured, late, scale = self._measured, _delays(model), self._scale(model)
-        filters = [self._filtered(model, bandwidth) for bandwidth in bandwidths]
-        shown = self._followed(model, filters)
-        found = np.zeros((len(filters), len(measured), 2 * measured.shape[1], measured.shape[2]))
-        for b, each in enumerate(filters):
-            coordinates, rates = shown.coordinates[:, :, b] / scale[:, None], shown.rates[:, :, b]
-            surprises = np.nan_to_num(measured / scale[:, None] - coordinates)
-            prior = np.concatenate([coordinates + late[:, None] * rates, rates], axis=1)
-            _smooth(*each, self._inputs.t, self._inputs.last, late, surprises, prior, found[b])
-        return found * np.tile(scale, 2)[:, None]
+        rows, joints, recordings = self._measured.shape
+        every = Places(*np.nonzero(np.arange(rows)[:, None] <= self._inputs.last))
+        found = np.zeros((rows, recordings, 2 * joints))
+        found[every] = self.following(ModelBatch(model), [self.filtered(model, bandwidth, every)])[0]
+        return found.transpose(0, 2, 1)
+
+    def following(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
+        """States of P models, as `along` has them, at the W places of their filters, shape (P, W, 2 joints).
+
+        Args:
+            batch: The models.
+            filters: That keep them close to the recordings: one for each, or one for all.
+        """
+        measured, late, scale = self._measured, delays_of(batch).T, scales_of(batch).T
+        group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
+        shown = self._followed(batch, filters, group)
+        coordinates = shown.coordinates.transpose(2, 0, 3, 1) / scale[:, None, None]  # (P, K + 1, R, joints)
+        surprises = np.nan_to_num(measured.transpose(0, 2, 1) / scale[:, None, None] - coordinates)
+        rates = shown.rates.transpose(2, 0, 3, 1)
+        found = np.concatenate([coordinates + late[:, None, None] * rates, rates], axis=3)
+        return np.stack(
+            [filters[group[p]].smoothed(found[p], surprises[p]) * np.tile(scale[p], 2) for p in range(batch.size)]
+        )
 
     def disturbance(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
         """Acceleration that a model lacks at every row, by the rows up to it, shape (K + 1, joints, R).
@@ -75,33 +147,27 @@ class Smoother:
             model: The model.
             bandwidth: Of each joint's filter, shape (joints,) [rad/s].
         """
-        each = self._filtered(model, bandwidth)
-        shown = self._followed(model, [each])
+        nowhere = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        each = self.filtered(model, bandwidth, nowhere)
+        shown = self._followed(ModelBatch(model), [each], np.zeros(1, dtype=np.int64))
         joints = self._measured.shape[1]
-        surprises = np.nan_to_num(self._measured - shown.coordinates[:, :, 0]) / self._scale(model)[:, None]
-        return np.cumsum(np.einsum("krij,kjr->kir", each.gains[:, :, 2 * joints :], surprises), axis=0)
+        surprises = np.nan_to_num(self._measured - shown.coordinates[:, :, 0]) / scales_of(ModelBatch(model))
+        return np.cumsum(np.einsum("krij,kjr->kir", each.along.gains[:, :, 2 * joints :], surprises), axis=0)
 
-    def _scale(self, model: Model) -> np.ndarray:
-        """What the sensors show of one unit, shape (joints,)."""
-        return np.array([1.0 + _value(model, f"sensor_{name}/scale", "e") for name in self.plant.coordinates])
-
-    def _followed(self, model: Model, filters: "Sequence[_Filter]") -> Rollouts:
-        """What a model, kept close by each of B filters, shows at every row before it is corrected there."""
-        inputs, measured, scale = self._inputs, self._measured, self._scale(model)
+    def _followed(self, batch: ModelBatch, filters: Sequence[Filter], group: np.ndarray) -> Rollouts:
+        """What P models, each kept close by one of the filters, show at every row before they are corrected there."""
+        inputs, measured = self._inputs, self._measured
         joints, recordings = measured.shape[1:]
-        gains = np.stack([each.gains for each in filters]) / scale
+        gains = np.stack([each.along.gains / each.scale for each in filters])
         recorded = np.zeros((len(measured), 2 * joints, recordings))
         recorded[:, :joints] = measured
         corrections = np.zeros((*gains.shape[:3], 2 * joints, 2 * joints))
         corrections[..., :joints] = gains[..., : 2 * joints, :]
         drift = np.zeros((*gains.shape[:3], joints, 2 * joints))
         drift[..., :joints] = gains[..., 2 * joints :, :]
-        count = len(filters)
-        idle = np.zeros((count, len(self.plant.commands)))
-        observer = Observer(recorded, corrections, np.arange(count), idle, drift=drift)
-        start = np.repeat(self._first_states(model)[:, None], count, axis=1)
-        batch = ModelBatch(model, (), np.zeros((count, 0)))
-        return self.simulator.follow(batch, inputs, start, observer)
+        idle = np.zeros((batch.size, len(self.plant.commands)))
+        observer = Observer(recorded, corrections, group, idle, drift=drift)
+        return self.simulator.follow(batch, inputs, self._first_states(batch), observer)
 
     def spread(self, model: Model, bandwidth: np.ndarray, rows: np.ndarray, recordings: np.ndarray) -> np.ndarray:
         """Covariance of true states at some rows by sensor noise and disturbance, shape (N, 2 joints, 2 joints).
@@ -115,33 +181,50 @@ class Smoother:
         inputs, joints = self._inputs, len(self.plant.coordinates)
         found = np.zeros((len(rows), 2 * joints, 2 * joints))
         _smoothed_covariance(
-            *self._filtered(model, bandwidth), inputs.t, inputs.last, _delays(model), rows, recordings, found
+            *self._along(model, bandwidth),
+            inputs.t,
+            inputs.last,
+            delays_of(ModelBatch(model))[:, 0],
+            rows,
+            recordings,
+            found,
         )
         return found
 
-    def _filtered(self, model: Model, bandwidth: np.ndarray) -> "_Filter":
+    def filtered(self, model: Model, bandwidth: np.ndarray, places: Places) -> Filter:
+        """The filter of a model, with what it needs to smooth at some places.
+
+        Args:
+            model: The model.
+            bandwidth: Of each joint, shape (joints,) [rad/s].
+            places: Where states are wanted.
+        """
+        scale, late = scales_of(ModelBatch(model))[:, 0], delays_of(ModelBatch(model))[:, 0]
+        along, inputs, joints = self._along(model, bandwidth), self._inputs, len(late)
+        until = np.zeros_like(places.rows)
+        for r, last in enumerate(inputs.last):
+            here, t = places.recordings == r, inputs.t[: last + 1, r]
+            until[here] = np.searchsorted(t, t[places.rows[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
+        ahead = np.zeros((len(places.rows), int(np.max(until - places.rows, initial=0)), 2 * joints, joints))
+        if len(places.rows):
+            moves = _moves(along.a, along.place, inputs.t, inputs.last)
+            gains = (along.covariance, along.gains, along.innovation)
+            _look_ahead(moves, *gains, late, places.rows, until, places.recordings, ahead)
+        return Filter(along, scale, places, ahead)
+
+    def _along(self, model: Model, bandwidth: np.ndarray) -> Along:
         inputs, measured = self._inputs, self._measured
         joints, recordings = measured.shape[1:]
         linear = linearise_along(model, measured)
-        sensor = self.noise / np.abs(self._scale(model))
+        sensor = self.noise / np.abs(scales_of(ModelBatch(model))[:, 0])
         n, rows = 3 * joints, len(measured)
         gains = np.zeros((rows, recordings, n, joints))
         covariance = np.zeros((rows, recordings, n, n))
         innovation = np.zeros((rows, recordings, joints, joints))
         rate = (np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval
-        _filter(
-            linear.a,
-            linear.place,
-            inputs.t,
-            inputs.last,
-            sensor**2,
-            rate,
-            _delays(model),
-            gains,
-            covariance,
-            innovation,
-        )
-        return _Filter(linear.a, linear.place, gains, covariance, innovation)
+        late = delays_of(ModelBatch(model))[:, 0]
+        _filter(linear.a, linear.place, inputs.t, inputs.last, sensor**2, rate, late, gains, covariance, innovation)
+        return Along(linear.a, linear.place, gains, covariance, innovation)
 
     @cached_property
     def _inputs(self) -> Inputs:
@@ -167,18 +250,19 @@ class Smoother:
         """Typical time between rows [s]."""
         return float(np.median(np.concatenate([np.diff(r.t) for r in self.recordings])))
 
-    def _first_states(self, model: Model) -> np.ndarray:
-        """True states at the first rows, by parabolas through what the sensors show, shape (2 joints, R)."""
+    def _first_states(self, batch: ModelBatch) -> np.ndarray:
+        """True states at the first rows, by parabolas through what the sensors show, shape (2 joints, P, R)."""
         joints = len(self.plant.coordinates)
-        found = np.zeros((2 * joints, len(self.recordings)))
+        shown = np.zeros((2 * joints, len(self.recordings)))
         for r, recording in enumerate(self.recordings):
             t = recording.t - recording.t[0]
             count = min(max(FEWEST_ROWS, int(np.searchsorted(t, FIRST_SPAN))), len(t))
             for j, name in enumerate(self.plant.coordinates):
                 fit = np.polynomial.polynomial.polyfit(t[:count], recording[name][:count], min(2, count - 1))
-                found[j, r], found[joints + j, r] = fit[0] - _value(model, f"sensor_{name}/bias", "b"), fit[1]
-                found[[j, joints + j], r] /= 1.0 + _value(model, f"sensor_{name}/scale", "e")
-        return found
+                shown[j, r], shown[joints + j, r] = fit[0], fit[1]
+        found = np.repeat(shown[:, None], batch.size, axis=1)
+        found[:joints] -= _of_sensors(batch, "bias", "b")[..., None]
+        return found / np.tile(scales_of(batch), (2, 1))[..., None]
 
 
 @dataclass(frozen=True)
@@ -190,7 +274,7 @@ class Starts:
         until: Row of each window at which its prediction starts, shape (R,).
         states: As the sensors show them, without their delay, shape (rows, 2 joints, B, R): one for all models, or one
             for each.
-        delays: Of the sensors of the model that they were estimated with, shape (joints,) [s].
+        delays: Of the sensors of the models that they were estimated with, shape (joints, B) [s].
     """
 
     windows: Windows
@@ -202,7 +286,7 @@ class Starts:
         """Of some of the B models, or of another one for each window, index (R,)."""
         if index.shape == self.until.shape:
             return replace(self, states=self.states[:, :, index, np.arange(len(index))][:, :, None])
-        return replace(self, states=self.states[:, :, index])
+        return replace(self, states=self.states[:, :, index], delays=self.delays[:, index])
 
     def path(self, batch: ModelBatch) -> Path:
         """The true states of each model that the sensors would show so."""
@@ -233,44 +317,41 @@ class Starts:
 
 def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:
     """Where predictions of windows start, by filters of B bandwidths, of each joint [rad/s]."""
-    t = windows.inputs.t
-    until = np.sum(t <= windows.starts + 1e-6, axis=0) - 1
+    filters = [smoother.filtered(model, bandwidth, leads_of(windows)) for bandwidth in bandwidths]
+    return starts_by(smoother, windows, ModelBatch(model, (), np.zeros((len(filters), 0))), filters)
+
+
+def leads_of(windows: Windows) -> Places:
+    """The rows that lead into windows, one after the other, the last one where it starts; window by window."""
+    until = np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1
     rows = np.minimum(np.arange(until.max() + 1)[:, None], until) + windows.row
-    found = smoother.along(model, bandwidths)[:, rows, :, windows.recording]
-    return Starts(windows, until, np.ascontiguousarray(found.transpose(0, 3, 2, 1)), _delays(model))
+    return Places(rows.ravel(), np.broadcast_to(windows.recording, rows.shape).ravel())
+
+
+def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
+    """Where predictions of windows start, by each of B models, with a filter for each or one for all."""
+    until = np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1
+    found = smoother.following(batch, filters).reshape(batch.size, until.max() + 1, windows.count, -1)
+    return Starts(windows, until, np.ascontiguousarray(found.transpose(1, 3, 0, 2)), delays_of(batch))
+
+
+def delays_of(batch: ModelBatch) -> np.ndarray:
+    """Delay of each coordinate's sensor in each of P models, shape (joints, P) [s]."""
+    return _of_sensors(batch, "delay", "tau")
+
+
+def scales_of(batch: ModelBatch) -> np.ndarray:
+    """What the sensors of each of P models show of one unit, shape (joints, P)."""
+    return 1.0 + _of_sensors(batch, "scale", "e")
+
+
+def _of_sensors(batch: ModelBatch, kind: str, symbol: str) -> np.ndarray:
+    return np.stack([_column(batch, f"sensor_{name}/{kind}", symbol) for name in batch.model.plant.coordinates])
 
 
 def _column(batch: ModelBatch, effect: str, symbol: str) -> np.ndarray:
     """A number of an effect in every model, shape (P,); zero where the effect is absent."""
     return batch.column(f"{effect}.{symbol}") if effect in batch.model.effects else np.zeros(batch.size)
-
-
-class _Filter(NamedTuple):
-    """A filter along recordings: what it was linearised at, gains, and covariances after each row.
-
-    Attributes:
-        a: Slopes of the accelerations at G places, shape (G, joints, 2 joints).
-        place: Of every row, shape (K + 1, R).
-        gains: From innovations to coordinates, rates and disturbances, shape (K + 1, R, 3 joints, joints).
-        covariance: Of these, after the row, shape (K + 1, R, 3 joints, 3 joints).
-        innovation: Inverse covariance of the innovations, shape (K + 1, R, joints, joints).
-    """
-
-    a: np.ndarray
-    place: np.ndarray
-    gains: np.ndarray
-    covariance: np.ndarray
-    innovation: np.ndarray
-
-
-def _value(model: Model, effect: str, symbol: str) -> float:
-    """A number of an effect; zero where the effect is absent."""
-    return model.effects[effect][symbol] if effect in model.effects else 0.0
-
-
-def _delays(model: Model) -> np.ndarray:
-    """Delay of each coordinate's sensor, shape (joints,) [s]."""
-    return np.array([_value(model, f"sensor_{name}/delay", "tau") for name in model.plant.coordinates])
 
 
 @cached
@@ -339,47 +420,51 @@ def _last_seen(t, k, r, last):
 
 
 @cached
-def _back(gain, innovation, surprise, late, move, adjoint, moved):
-    """Take the adjoint state from after the correction at a row to the row before."""
-    joints, n = len(late), len(adjoint)
-    moved[:] = adjoint
-    for j in range(joints):
-        pull = 0.0
-        for q in range(joints):
-            pull += innovation[j, q] * surprise[q]
-        for q in range(n):
-            pull -= gain[q, j] * adjoint[q]
-        moved[j] += pull
-        moved[joints + j] -= late[j] * pull
-    for q in range(n):
-        adjoint[q] = 0.0
-        for p in range(n):
-            adjoint[q] += move[p, q] * moved[p]
+def _moves(a, place, t, last):
+    """Transitions to every row from the one before, shape (K + 1, R, n, n)."""
+    n = 3 * a.shape[1]
+    small = np.zeros((n - a.shape[1], n - a.shape[1]))
+    found = np.zeros((*place.shape, n, n))
+    for r in range(place.shape[1]):
+        for k in range(last[r]):
+            _transition(a[place[k, r]], t[k + 1, r] - t[k, r], small, found[k + 1, r])
+    return found
 
 
 @cached
-def _smooth(a, place, gains, covariance, innovation, t, last, late, surprises, prior, found):
-    """States at every row by the rows up to `LOOK_AHEAD` later, from the innovations (K + 1, joints, R)."""
-    joints = a.shape[1]
-    n = 3 * joints
-    small, transition = np.zeros((2 * joints, 2 * joints)), np.zeros((n, n))
-    adjoint, moved = np.zeros(n), np.zeros(n)
-    for r in range(place.shape[1]):
-        moves = np.zeros((last[r], n, n))
-        for k in range(last[r]):
-            _transition(a[place[k, r]], t[k + 1, r] - t[k, r], small, transition)
-            moves[k] = transition
-        for k in range(last[r] + 1):
-            adjoint[:] = 0.0
-            for i in range(_last_seen(t, k, r, last[r]), k, -1):
-                _back(gains[i, r], innovation[i, r], surprises[i, :, r], late, moves[i - 1], adjoint, moved)
-            for i in range(2 * joints):
-                total = prior[k, i, r]
+def _look_ahead(moves, covariance, gains, innovation, late, rows, until, recordings, found):
+    """Gains from the innovations of later rows, until some row, to the states at some rows."""
+    joints, n = len(late), covariance.shape[3]
+    back, moved, seen = np.zeros(n), np.zeros(n), np.zeros(joints)
+    for w in range(len(rows)):
+        r = recordings[w]
+        for q in range(2 * joints):
+            back[:] = covariance[rows[w], r, q]
+            for i in range(rows[w] + 1, until[w] + 1):
+                for p in range(n):
+                    moved[p] = np.sum(moves[i, r, p] * back)
                 for j in range(joints):
-                    total += gains[k, r, i, j] * surprises[k, j, r]
-                for q in range(n):
-                    total += covariance[k, r, i, q] * adjoint[q]
-                found[k, i, r] = total
+                    seen[j] = moved[j] - late[j] * moved[joints + j]
+                for p in range(n):
+                    back[p] = moved[p] - np.sum(gains[i, r, p] * seen)
+                for m in range(joints):
+                    found[w, i - rows[w] - 1, q, m] = np.sum(seen * innovation[i, r, :, m])
+
+
+@cached
+def _smooth(gains, ahead, rows, recordings, prior, surprises, found):
+    """States at some rows from those before their correction, and the innovations there and later."""
+    joints = surprises.shape[2]
+    for w in range(len(rows)):
+        k, r = rows[w], recordings[w]
+        until = min(ahead.shape[1], len(prior) - 1 - k)
+        for i in range(2 * joints):
+            total = prior[k, r, i]
+            for j in range(joints):
+                total += gains[k, r, i, j] * surprises[k, r, j]
+                for m in range(until):
+                    total += ahead[w, m, i, j] * surprises[k + 1 + m, r, j]
+            found[w, i] = total
 
 
 @cached
