@@ -2,8 +2,9 @@
 
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
-So innovations come first. The search is repeated by forecasts where the first one leaves something significant over,
-or where its laws hold only nearly (`Inquiry.is_trusted`).
+So innovations come first. The search is repeated by forecasts where the laws of the first one, with what stands in for
+what they leave over, hold only nearly (`Inquiry.is_trusted`). If recordings are far likelier with that stand-in, half a
+second ahead, than with all that forecasts find, the first answer counts.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.diagnosis.decision import Rest, decided, significant_leftovers
-from wipx.diagnosis.fitting import LEAST_GAIN, Fit
+from wipx.diagnosis.fitting import ALIKE, LEAST_GAIN, Fit
 from wipx.diagnosis.forecasts import ForecastFitter
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
@@ -45,19 +46,25 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
         chosen: What it chose.
     """
     inquiry = inquiry.trusting(chosen)
-    shapes = shapes_of(inquiry.by_row, chosen)
-    left, _ = _left_by_row(inquiry, chosen, selection.nominal, shapes)
     fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, inquiry.setting.doubted())
-    if left and fitter.is_possible:
-        return _by_forecasts(inquiry, fitter, chosen)[0]
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if not fitter.is_possible or (not rest.significant and inquiry.is_trusted(chosen)):
+    if not fitter.is_possible or inquiry.is_trusted(rest.fit):
         return by_row
     ahead, agrees = _by_forecasts(inquiry, fitter, chosen)
     if rest.significant:
+        if _is_far_likelier(fitter, rest, ahead.rest.fit):
+            return by_row
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
     return by_row if agrees else ahead
+
+
+def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
+    """Whether what has no name in the vocabulary predicts half a second far better than what has, in most stretches."""
+    seen = fitter.seen_ahead(rest.fit)
+    numbers = len(rest.fit.hypothesis.cube) + len(rest.spread) - len(other.hypothesis.cube)
+    lead = seen.log_likelihood - other.log_likelihood - 0.5 * numbers * float(np.log(fitter.rows))
+    return fitter.separation(seen, other, lead, 1.0) > ALIKE
 
 
 def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
@@ -74,10 +81,10 @@ def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tupl
     same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
     if not selection.worthwhile(nominal, same):
         same = nominal
-    if set(same.effects) != set(best.effects) and selection.score(same, nominal) > selection.score(best, nominal):
+    if set(same.effects) != set(best.effects) and selection.lead(same, best) > 0.0:
         best = selection.exchanged(same)
-    lead = selection.score(best, nominal) - selection.score(same, nominal)
-    agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and lead < LEAST_GAIN
+    hardly = set(same.effects) == set(best.effects) or selection.lead(best, same) < LEAST_GAIN
+    agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
     ahead = ahead.trusting(best)
     return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
 

@@ -22,7 +22,7 @@ from wipx.diagnosis.combined import combined
 from wipx.diagnosis.curves import law_curve
 from wipx.diagnosis.decision import Rest
 from wipx.diagnosis.experiment import Question, next_experiment
-from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.fitting import ALIKE, Fit
 from wipx.diagnosis.heldout import Transfer, judged, transfer
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import FAR_FROM_THE_FLOOR, Inquiry
@@ -39,7 +39,6 @@ from wipx.diagnosis.stand_in import curve_of
 from wipx.effects.catalogue import effect_of
 from wipx.sim.simulator import StateFeedback
 
-ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
 CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
 
 
@@ -171,7 +170,7 @@ def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tu
             other = max(other, again, key=lambda found: found.log_likelihood)
         loss = selection.evidence(base, fit) - selection.evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
-        rivals.append(Alternative(name, float(np.sqrt(max(2.0 * loss / overstated, 0.0))), values))
+        rivals.append(Alternative(name, inquiry.fitter.separation(fit, other, loss, overstated), values))
         weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
     rivals.sort(key=lambda rival: rival.separation)
     return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
@@ -227,6 +226,8 @@ def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
                 found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
         for name in effect.equivalent:
             found.append(f"{effect.name} cannot be told from {name}")
+        if effect.heldout_gain < 0.0:
+            found.append(f"{effect.name} with numbers fitted to the other recordings predicts a recording no better")
     return tuple(found)
 
 

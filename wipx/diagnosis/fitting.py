@@ -28,6 +28,7 @@ SECANT = 0.3  # standard deviations over which later slopes are taken
 DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
 LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
+ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
 POLISHED = 0.5  # nats at which alternating ends
 
 
@@ -164,6 +165,27 @@ class Fitter(ABC):
     @abstractmethod
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Whether what a fit has beside a smaller one shows in recordings that it was not fitted to."""
+
+    @abstractmethod
+    def lead(self, fit: Fit, other: Fit, score: float) -> float:
+        """By how much a fit is better than one of other effects [nats].
+
+        Args:
+            fit: The fit.
+            other: The other one.
+            score: Penalised evidence that the fit has beyond the other one [nats].
+        """
+
+    @abstractmethod
+    def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
+        """By how many standard deviations a fit explains the recordings better than a rival.
+
+        Args:
+            fit: The fit.
+            rival: Another one with as many numbers, or nearly.
+            lead: Evidence that the fit has beyond the rival [nats].
+            overstated: By how much evidence is, see `robust.inflation`.
+        """
 
     @abstractmethod
     def loosened(self, fit: Fit) -> Any:

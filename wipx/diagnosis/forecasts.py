@@ -34,7 +34,7 @@ from wipx.sim.analytic import AnalyticSimulator
 
 HORIZON = 0.5  # [s] of the longest prediction, contract section 4
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
-SPACING = 0.005  # [s] of rows, at most; faster logs are condensed
+SPACING = 0.005  # [s] of the rows of condensed logs, about
 STRIDE = 0.25  # [s] from one start to the next
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 LEAD = 0.1  # [s] of smoothed states before a start
@@ -46,6 +46,7 @@ DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are
 MATTERS = 0.05  # nats for each prediction: as if its error at one horizon became 5 % smaller
 PARTS = 6  # of the stretches, each predicted by numbers that suit the others
 DAMPED = 1e-3  # relative, of the step to these numbers
+STEPS = (1.0, 0.3)  # shares of it that are tried; none of it where neither is an improvement
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
 MACHINE = ("offset", "load_friction")  # kinds that section 6 of the contract has beside those of section 3
 STEP = 2.0  # times the simulator's usual step, exact enough where no law is
@@ -203,13 +204,16 @@ class ForecastFitter(Fitter):
         Student's test on the differences of their likelihoods (Vuong 1989, Econometrica 57(2)), at a level for all
         effects that are looked at together. In long recordings it must also matter, not only be certain.
         """
-        differences = np.bincount(self._stretch, self._held_out(larger) - self._held_out(smaller))
-        kept = differences[np.bincount(self._stretch, self._counted) > 0]
+        kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
         count = len(kept)
         looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
         reach = -float(stdtrit(count - 1, LEVEL / looked_at))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
         return float(kept.sum()) >= max(LEAST_GAIN, chance, MATTERS * self.rows)
+
+    def _by_stretch(self, values: np.ndarray) -> np.ndarray:
+        """Sums of what predictions have (N,), over each stretch of time in which any counts."""
+        return np.bincount(self._stretch, values)[np.bincount(self._stretch, self._counted) > 0]
 
     @cached_property
     def _stretch(self) -> np.ndarray:
@@ -217,18 +221,30 @@ class ForecastFitter(Fitter):
         return np.unique(self.blocks[:, 0], return_inverse=True)[1].ravel()
 
     def _held_out(self, fit: Fit) -> np.ndarray:
-        """Log-likelihood of each prediction by the numbers that suit other stretches, shape (N,)."""
+        """Log-likelihood of each prediction by the numbers that suit other stretches, shape (N,).
+
+        All of them bear what it costs to move numbers that are in doubt.
+        """
         key = _key(fit)
         if key not in self._doubts:
             begun = Hypothesis.of(self.doubted, fit.effects, fit.hypothesis.values)
-            self._doubts[key] = self._judged_by_others(self.fit(begun, fit.levels, steps=DOUBTS))
+            moved = self.fit(begun, fit.levels, steps=DOUBTS)
+            cost = 0.5 * np.sum(moved.hypothesis.space.prior_residuals(moved.hypothesis.cube) ** 2)
+            self._doubts[key] = self._judged_by_others(moved) - cost * self._counted / self._counted.sum()
         return self._doubts[key]
 
     def _judged_by_others(self, fit: Fit) -> np.ndarray:
-        part = self._stretch % PARTS
-        cubes = np.stack([self._by_others(fit, part == k) for k in range(PARTS)])
-        white = self.white_of(fit, fit.hypothesis.space.batch(cubes)).reshape(PARTS, *fit.white.shape)
-        return self._likelihoods(replace(fit, white=white[part, np.arange(self.windows.count)]))
+        """Likelihoods by steps to numbers that suit the others, each as long as these agree with it."""
+        part, count = self._stretch % PARTS, self.windows.count
+        steps = np.stack([self._by_others(fit, part == k) for k in range(PARTS)]) - fit.hypothesis.cube
+        tried = np.concatenate([fit.hypothesis.cube + share * steps for share in STEPS])
+        white = self.white_of(fit, fit.hypothesis.space.batch(tried)).reshape(len(tried), *fit.white.shape)
+        by_window = np.stack([self._likelihoods(replace(fit, white=each)) for each in (*white, fit.white)])
+        found = np.zeros(count)
+        for k in range(PARTS):
+            own = by_window[[*range(k, len(tried), PARTS), -1]]
+            found[part == k] = own[np.argmax(own[:, part != k].sum(axis=1))][part == k]
+        return found
 
     def _by_others(self, fit: Fit, left_out: np.ndarray) -> np.ndarray:
         """Position in the cube that suits all predictions but some (N,), by one Gauss-Newton step, shape (D,)."""
@@ -245,6 +261,15 @@ class ForecastFitter(Fitter):
         """Log-likelihood of each prediction, shape (N,)."""
         scale = SHARE * float(np.log(np.diag(fit.noise.whitening)).sum())
         return np.where(self._counted, scale - 0.5 * np.sum(fit.white**2, axis=1), 0.0)
+
+    def lead(self, fit: Fit, other: Fit, score: float) -> float:
+        """What it predicts held-out stretches better, beside numbers in doubt."""
+        return float(np.sum(self._held_out(fit) - self._held_out(other)))
+
+    def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
+        """As stretches of time agree on it (Vuong 1989): where no law holds, one predicts this better, another that."""
+        differences = self._by_stretch(self._likelihoods(fit) - self._likelihoods(rival))
+        return float(max(lead, 0.0) / max(np.sqrt(len(differences)) * np.std(differences, ddof=1), 1e-12))
 
     def loosened(self, fit: Fit) -> Anchors:
         """Starts by the fit itself, of the best filter near its own."""
@@ -265,6 +290,10 @@ class ForecastFitter(Fitter):
     def sketched_by_row(self, fit: Fit) -> tuple[InnovationFitter, Fit]:
         """The same with the noise of what innovations chose."""
         return self.by_row, self.by_row.fit(fit.hypothesis, self.levels_by_row, steps=0)
+
+    def seen_ahead(self, fit: Fit) -> Fit:
+        """A fit by innovations as its forecasts show it."""
+        return self.fit(fit.hypothesis, self.anchored(fit.hypothesis.model), steps=0)
 
     def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
         """Starts by the model, of the filter from which its predictions are likeliest."""
@@ -360,7 +389,7 @@ def condensed(recording: Recording, commands: tuple[str, ...]) -> Recording:
 
     Many more rows than a joint's motion needs cost time and tell little more of half a second.
     """
-    every = 1 + 2 * int(0.5 * max(SPACING * recording.rate - 1.0, 0.0))
+    every = 1 + 2 * round(0.5 * max(SPACING * recording.rate - 1.0, 0.0))
     kept = len(recording) // every - 1
     if every == 1 or kept < 2:
         return recording

@@ -94,6 +94,14 @@ class InnovationFitter(Fitter):
         """Always: where laws hold, their likelihood says all."""
         return True
 
+    def lead(self, fit: Fit, other: Fit, score: float) -> float:
+        """The penalised evidence."""
+        return score
+
+    def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
+        """As if one number more made the difference: a likelihood ratio."""
+        return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
+
     def loosened(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
         return replace(fit.levels, force=LOUDER * fit.levels.force)

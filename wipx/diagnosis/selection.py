@@ -83,7 +83,7 @@ class Selection:
             told = len(self.considered)
             self._remember(current, extended, best)
             pruned = self.pruned(self.settled(best))
-            if len(pruned.effects) == len(current.effects) and self._lead(pruned, current) < LEAST_LEAD:
+            if len(pruned.effects) == len(current.effects) and self.lead(pruned, current) < LEAST_LEAD:
                 del self.considered[told:]
                 reason = "hardly better in the place of one that is there"
                 self.considered.append(Candidate(best.effects[-1], self.evidence(current, best), False, reason))
@@ -260,8 +260,8 @@ class Selection:
             for effect in fit.effects:
                 base = self.without(fit, effect)
                 found = self.preferred(self.extensions(base), base)
-                if found is not None and self._lead(found, fit) > most and self.worthwhile(base, found):
-                    best, most = found, self._lead(found, fit)
+                if found is not None and self.lead(found, fit) > most and self.worthwhile(base, found):
+                    best, most = found, self.lead(found, fit)
             if best is fit:
                 best = self._with_fewer(fit)
             if best is fit:
@@ -294,6 +294,10 @@ class Selection:
 
     def _lead(self, fit: Fit, other: Fit) -> float:
         return self.score(fit, self.nominal) - self.score(other, self.nominal)
+
+    def lead(self, fit: Fit, other: Fit) -> float:
+        """By how much a fit is better than another one, as the evidence judges it [nats]."""
+        return self.fitter.lead(fit, other, self._lead(fit, other))
 
     def _tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
         """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""

@@ -79,13 +79,13 @@ class Filter:
     ahead: np.ndarray
 
     def smoothed(self, prior: np.ndarray, surprises: np.ndarray) -> np.ndarray:
-        """States at the places, shape (W, 2 joints).
+        """States of P models at the places, shape (W, 2 joints, P).
 
         Args:
-            prior: States at every row before they are corrected there, shape (K + 1, R, 2 joints).
-            surprises: Innovations there, shape (K + 1, R, joints).
+            prior: States at every row before they are corrected there, shape (K + 1, R, 2 joints, P).
+            surprises: Innovations there, shape (K + 1, R, joints, P).
         """
-        found = np.empty((len(self.places.rows), prior.shape[2]))
+        found = np.empty((len(self.places.rows), *prior.shape[2:]))
         _smooth(self.along.gains, self.ahead, *self.places, prior, surprises, found)
         return found
 
@@ -129,16 +129,20 @@ class Smoother:
             batch: The models.
             filters: That keep them close to the recordings: one for each, or one for all.
         """
-        measured, late, scale = self._measured, delays_of(batch).T, scales_of(batch).T
+        late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
         shown = self._followed(batch, filters, group)
-        coordinates = shown.coordinates.transpose(2, 0, 3, 1) / scale[:, None, None]  # (P, K + 1, R, joints)
-        surprises = np.nan_to_num(measured.transpose(0, 2, 1) / scale[:, None, None] - coordinates)
-        rates = shown.rates.transpose(2, 0, 3, 1)
-        found = np.concatenate([coordinates + late[:, None, None] * rates, rates], axis=3)
-        return np.stack(
-            [filters[group[p]].smoothed(found[p], surprises[p]) * np.tile(scale[p], 2) for p in range(batch.size)]
-        )
+        coordinates, rates = (np.nan_to_num(x.transpose(0, 3, 1, 2)) for x in (shown.coordinates, shown.rates))
+        coordinates /= scale
+        surprises = self._measured.transpose(0, 2, 1)[..., None] / scale - coordinates
+        prior = np.concatenate([coordinates + late * rates, rates], axis=2)  # (K + 1, R, 2 joints, P)
+        if len(filters) == 1:
+            found = filters[0].smoothed(prior, surprises)
+        else:
+            own = [np.ascontiguousarray(x) for x in (prior, surprises)]
+            parts = [f.smoothed(*(x[..., [p]] for x in own)) for p, f in enumerate(filters)]
+            found = np.concatenate(parts, axis=2)
+        return (found * np.tile(scale, (2, 1))).transpose(2, 0, 1)
 
     def disturbance(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
         """Acceleration that a model lacks at every row, by the rows up to it, shape (K + 1, joints, R).
@@ -432,6 +436,22 @@ def _moves(a, place, t, last):
 
 
 @cached
+def _carried(back, move, gain, late, moved, seen):
+    """Take a row of gains (n,) from the correction at a row to that at the next; `seen` of it by the sensors there."""
+    joints = len(late)
+    for p in range(len(back)):
+        moved[p] = 0.0
+        for m in range(len(back)):
+            moved[p] += move[p, m] * back[m]
+    for j in range(joints):
+        seen[j] = moved[j] - late[j] * moved[joints + j]
+    for p in range(len(back)):
+        back[p] = moved[p]
+        for j in range(joints):
+            back[p] -= gain[p, j] * seen[j]
+
+
+@cached
 def _look_ahead(moves, covariance, gains, innovation, late, rows, until, recordings, found):
     """Gains from the innovations of later rows, until some row, to the states at some rows."""
     joints, n = len(late), covariance.shape[3]
@@ -441,30 +461,28 @@ def _look_ahead(moves, covariance, gains, innovation, late, rows, until, recordi
         for q in range(2 * joints):
             back[:] = covariance[rows[w], r, q]
             for i in range(rows[w] + 1, until[w] + 1):
-                for p in range(n):
-                    moved[p] = np.sum(moves[i, r, p] * back)
-                for j in range(joints):
-                    seen[j] = moved[j] - late[j] * moved[joints + j]
-                for p in range(n):
-                    back[p] = moved[p] - np.sum(gains[i, r, p] * seen)
+                _carried(back, moves[i, r], gains[i, r], late, moved, seen)
                 for m in range(joints):
-                    found[w, i - rows[w] - 1, q, m] = np.sum(seen * innovation[i, r, :, m])
+                    for j in range(joints):
+                        found[w, i - rows[w] - 1, q, m] += seen[j] * innovation[i, r, j, m]
 
 
 @cached
 def _smooth(gains, ahead, rows, recordings, prior, surprises, found):
     """States at some rows from those before their correction, and the innovations there and later."""
-    joints = surprises.shape[2]
+    joints, models = surprises.shape[2:]
     for w in range(len(rows)):
         k, r = rows[w], recordings[w]
         until = min(ahead.shape[1], len(prior) - 1 - k)
         for i in range(2 * joints):
-            total = prior[k, r, i]
+            for p in range(models):
+                found[w, i, p] = prior[k, r, i, p]
             for j in range(joints):
-                total += gains[k, r, i, j] * surprises[k, r, j]
+                for p in range(models):
+                    found[w, i, p] += gains[k, r, i, j] * surprises[k, r, j, p]
                 for m in range(until):
-                    total += ahead[w, m, i, j] * surprises[k + 1 + m, r, j]
-            found[w, i] = total
+                    for p in range(models):
+                        found[w, i, p] += ahead[w, m, i, j] * surprises[k + 1 + m, r, j, p]
 
 
 @cached

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 from wipx.concealed.folder import RunFolder
@@ -66,7 +66,7 @@ def write_results(folder: RunFolder, cases: Sequence[Opened], account: Account, 
         write_json(draft / "score.json", _summary(cases, account))
         draw_confusions(confusions(scores), draft / "confusions.png")
     if page is not None:
-        replace_table(page, score_markdown(shown, links=False))
+        replace_table(page, score_markdown(replace(shown, details=()), links=False))
     return f"\n{shown.headline}\npage: {folder.path / 'index.html'}"
 
 
