@@ -49,7 +49,7 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, inquiry.setting.doubted())
     rest, shapes = decided(inquiry, selection, chosen)
     by_row = Found(inquiry, selection, rest, shapes)
-    if not fitter.is_possible or inquiry.is_trusted(rest.fit):
+    if not fitter.is_possible or (not rest.significant and inquiry.is_trusted(rest.fit)):
         return by_row
     ahead, agrees = _by_forecasts(inquiry, fitter, chosen)
     if rest.significant:
