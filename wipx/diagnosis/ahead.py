@@ -56,7 +56,14 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
-    return by_row if agrees else ahead
+    exact = bool(rest.fit.effects) and inquiry.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
+    return by_row if agrees or exact else ahead
+
+
+def _predicts_better(one: Found, other: Found) -> bool:
+    """Whether an answer predicts the recordings better than another one."""
+    errors, others = (each.inquiry.errors(each.rest.fit).completed for each in (one, other))
+    return float(np.mean([(errors[name] / max(others[name], 1e-300)) ** 2 for name in errors])) < 1.0
 
 
 def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
@@ -70,7 +77,7 @@ def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
 def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
     """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
 
-    A second search starts from what innovations chose; the likelier end counts.
+    A second search starts from what innovations chose; the better end counts.
     """
     setting = inquiry.setting
     ahead = replace(inquiry, fitter=fitter)
