@@ -9,7 +9,7 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.case import Robot, diagnose
-from wipx.diagnosis.fitting import Fit
+from wipx.diagnosis.fitting import ALIKE, Fit
 from wipx.diagnosis.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.selection import Selection
@@ -68,6 +68,28 @@ def test_friction_holds_beside_numbers_in_doubt_and_what_is_not_there_does_not(f
     assert fitter.holds(nominal, friction)
     assert not fitter.holds(friction, nominal)
     assert not fitter.holds(friction, spring)
+
+
+def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):
+    hidden = {"sensor_theta/delay": {"tau": 0.015}}
+    case = shaken(bench("pendulum", hidden, fresh_seed, count=3), np.random.default_rng(fresh_seed))
+    late = forecasts(case).begun(Hypothesis.of(case.setting, ("sensor_theta/delay",), {}))
+    assert late.hypothesis.values["sensor_theta/delay.tau"] == pytest.approx(0.015, rel=0.4)
+
+
+def test_two_laws_of_one_equation_are_not_told_apart_and_friction_is_from_a_spring(fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    fitter = forecasts(case)
+    friction, rich, spring = (
+        fitter.begun(Hypothesis.of(case.setting, (effect,), {}))
+        for effect in ("translation/coulomb", "translation/presliding", "environment/spring")
+    )
+    assert _separation(fitter, friction, rich) < ALIKE
+    assert _separation(fitter, friction, spring) > ALIKE
+
+
+def _separation(fitter: ForecastFitter, fit: Fit, rival: Fit) -> float:
+    return fitter.separation(fit, rival, fit.log_likelihood - rival.log_likelihood, 1.0)
 
 
 def _with(case: Bench, fit: Fit, effect: str) -> Hypothesis:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from identify.emulated_robot import Robot, nominal_model
 
+from wipx.core.model import ModelBatch
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
-from wipx.identify.smoothing import BANDWIDTHS, Smoother
-from wipx.identify.windows import LOOK_AHEAD
+from wipx.identify.smoothing import BANDWIDTHS, Smoother, leads_of, starts_by
+from wipx.identify.windows import LOOK_AHEAD, cut
 from wipx.sim.analytic import AnalyticSimulator
 
 SIMULATOR = AnalyticSimulator(threads=1)
@@ -46,6 +47,20 @@ def test_a_wrong_model_predicts_best_from_states_that_hardly_trust_it(kind: str,
     errors = [judge.compare(m, m, recordings, held_out=True)[0].completed for m in (wrong, trusted)]
     for name in nominal.plant.coordinates:
         assert errors[0][name] < errors[1][name]
+
+
+def test_models_that_are_followed_together_have_the_states_of_each_alone(fresh_seed: int):
+    model = nominal_model("wip").with_effects({"sensor_theta/scale": {"e": 0.02}, "actuator/gain": {"k": 1.0}})
+    recordings = recorded("wip", {}, fresh_seed)
+    smoother = Smoother(SIMULATOR, model.plant, recordings, sensor_noise(recordings, model.plant))
+    windows = cut(recordings, model.plant, horizon=0.5, lead=0.1)
+    one = [smoother.filtered(model, np.full(2, 10.0), leads_of(windows))]
+    names, values = ("actuator/gain.k", "sensor_theta/scale.e"), np.array([[0.8, 0.0], [1.1, 0.03]])
+    together = starts_by(smoother, windows, ModelBatch(model, names, values), one).states
+    for p, each in enumerate(values):
+        alone = starts_by(smoother, windows, ModelBatch(model, names, each[None]), one).states
+        np.testing.assert_allclose(together[:, :, [p]], alone, rtol=1e-9, atol=1e-12)
+    assert not np.allclose(together[:, :, 0], together[:, :, 1])
 
 
 def test_a_constant_acceleration_that_the_model_lacks_is_found(fresh_seed: int):

@@ -40,7 +40,7 @@ def in_two(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
 
 
 def unwatched(stage: str, share: float) -> None:
-    """A watcher that looks away."""
+    """Report progress to nobody."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ class Progress:
 
 
 def unwatched(progress: Progress) -> None:
-    """A watcher that looks away."""
+    """Report progress to nobody."""
 
 
 @dataclass(frozen=True)
