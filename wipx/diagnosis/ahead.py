@@ -55,6 +55,8 @@ def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
     if rest.significant:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row
+        if ahead.rest.significant or ahead.inquiry.is_quiet(ahead.rest.fit):
+            return ahead
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
     exact = bool(rest.fit.effects) and inquiry.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
     return by_row if agrees or exact else ahead
