@@ -26,6 +26,7 @@ PLANTS = MappingProxyType(
     }
 )
 SURE = 0.999  # probabilities beyond are not told apart
+CERTAIN = 1e-3  # probability of chance below which something is certain, though it may be small
 
 
 def capitalised(text: str) -> str:
@@ -135,6 +136,8 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     left = diagnosis.unexplained
     chance = p_value(left.p_value)
     aside = f" ({chance})" if chance else ""
+    if not left.significant and left.p_value < CERTAIN:
+        return f"What is left over is not chance, but too small to be named{aside}."
     if not left.significant:
         return f"Nothing significant is left over{aside}."
     kind = diagnosis.model.plant.kind
