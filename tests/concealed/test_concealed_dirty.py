@@ -1,5 +1,6 @@
 """Dirty robots: as much dirt as is stated, the same from the same seed, sealed, and readable."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -167,7 +168,9 @@ def test_sizes_of_dirt_stay_within_what_is_told(fresh_seed: int):
         assert len(set(dirt.names)) >= 3
         assert all(abs(error) * LARGEST <= 0.02 for error in dirt.errors.values())
         for name, most in (("wander", 0.25), ("wander_place", 0.25), ("wander_load", 0.25), ("uneven", 0.075)):
-            assert all(abs(size) <= most + 1e-12 for size in fields.get(name, {}).values())
+            sizes = fields.get(name, {})
+            assert isinstance(sizes, Mapping)
+            assert all(abs(size) <= most + 1e-12 for size in sizes.values())
         assert set(fields) <= set(physics("wip", robot.parameters, Hidden()).dtype.names or ())
 
 
