@@ -9,7 +9,8 @@ from identify.emulated_robot import Robot, nominal_model
 from wipx.core.model import ModelBatch
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
-from wipx.identify.smoothing import BANDWIDTHS, Smoother, leads_of, starts_by
+from wipx.identify.smoothing import BANDWIDTHS, Smoother
+from wipx.identify.starts import leads_of, starts_by
 from wipx.identify.windows import LOOK_AHEAD, cut
 from wipx.sim.analytic import AnalyticSimulator
 

@@ -28,7 +28,9 @@ from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.log import Log
 from wipx.diagnosis.observer import NoiseLevels
 from wipx.effects.catalogue import vocabulary
-from wipx.identify.smoothing import BANDWIDTHS, Filter, Smoother, leads_of, starts_by
+from wipx.identify.kalman import Filter
+from wipx.identify.smoothing import BANDWIDTHS, Smoother
+from wipx.identify.starts import leads_of, starts_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
 

@@ -9,8 +9,10 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
+from wipx.identify.kalman import Places
 from wipx.identify.prediction import DIVERGED
-from wipx.identify.smoothing import BANDWIDTHS, Smoother, Starts, starts_of
+from wipx.identify.smoothing import BANDWIDTHS, Smoother
+from wipx.identify.starts import Starts, starts_of
 from wipx.identify.windows import LEAD, LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import Simulator
@@ -147,7 +149,7 @@ class Judge:
         windows = starts.windows
         rows = windows.row + starts.until
         bandwidth = np.full(len(self.noise), RIGHT)
-        covariance = smoother.spread(model, bandwidth, rows, windows.recording)
+        covariance = smoother.filtered(model, bandwidth, Places(rows, windows.recording)).spread()
         factors = np.linalg.cholesky(covariance + 1e-18 * np.eye(covariance.shape[1]))
         base = self._replayed(model, starts, 1)
         variance = np.zeros_like(base[:, :, 0]) + (self.noise**2)[:, None]

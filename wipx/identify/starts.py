@@ -1,0 +1,63 @@
+"""Where predictions of windows start: smoothed states, and those that lead up to them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.model import Model, ModelBatch
+from wipx.identify.kalman import Filter, Places
+from wipx.identify.smoothing import Smoother, of_sensors, scales_of
+from wipx.identify.windows import Windows
+from wipx.sim.simulator import Path
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Windows, and the states that lead into them.
+
+    Attributes:
+        windows: R of them.
+        until: Row of each window at which its prediction starts, shape (R,).
+        states: As the sensors of each of B models show them, without their delay, shape (rows, 2 joints, B, R).
+    """
+
+    windows: Windows
+    until: np.ndarray
+    states: np.ndarray
+
+    def of(self, index: np.ndarray) -> "Starts":
+        """Of another one of the B models for each window, index (R,)."""
+        return replace(self, states=self.states[:, :, index, np.arange(len(index))][:, :, None])
+
+    def path(self, batch: ModelBatch) -> Path:
+        """The true states of each of the B models that its sensors would show so."""
+        states = self.states.copy()
+        joints = states.shape[1] // 2
+        states[:, :joints] -= of_sensors(batch, "bias", "b")[..., None]
+        return Path(states / np.tile(scales_of(batch), (2, 1))[..., None], self.until)
+
+
+def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:
+    """Starts by one model, with filters of B bandwidths, each of shape (joints,) [rad/s]."""
+    filters = [smoother.filtered(model, bandwidth, leads_of(windows)) for bandwidth in bandwidths]
+    return starts_by(smoother, windows, ModelBatch(model, (), np.zeros((len(filters), 0))), filters)
+
+
+def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
+    """Starts by each of B models, with a filter for each or one for all; these smooth at `leads_of` the windows."""
+    until = _until(windows)
+    found = smoother.following(batch, filters).reshape(batch.size, until.max() + 1, windows.count, -1)
+    return Starts(windows, until, np.ascontiguousarray(found.transpose(1, 3, 0, 2)))
+
+
+def leads_of(windows: Windows) -> Places:
+    """The rows that lead up to the start of each window: the first ones of all windows, then the second ones."""
+    until = _until(windows)
+    rows = np.minimum(np.arange(until.max() + 1)[:, None], until) + windows.row
+    return Places(rows.ravel(), np.broadcast_to(windows.recording, rows.shape).ravel())
+
+
+def _until(windows: Windows) -> np.ndarray:
+    """Row of each window at which its prediction starts, shape (R,)."""
+    return np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1
