@@ -1,11 +1,28 @@
 """What an effect is: physics that can be missing from a nominal model, at a site."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
 
 from wipx.core.parameters import Parameter
 
 JOINT_SITES = ("translation", "pitch", "joint1", "joint2")
 SENSOR_SITES = ("sensor_x", "sensor_theta", "sensor_theta1", "sensor_theta2")
+
+
+class Steady(NamedTuple):
+    """An effect as a curve over one signal, all others constant.
+
+    Attributes:
+        over: The signal: rate or coordinate of the joint, or the force that reaches this part of the drive.
+        force: What the effect adds, (N,) [N or N m], to values of the signal (N,), by its parameters and the rigid
+            body's numbers.
+    """
+
+    over: Literal["rate", "coordinate", "command"]
+    force: Callable[[np.ndarray, Mapping[str, float], Mapping[str, float]], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -25,6 +42,7 @@ class Effect:
         doubt: Relative standard deviation of its first number by what its law leaves open.
         beyond: Whether contract section 3 lacks it: a diagnosis names such an effect only where those of the
             contract leave something over.
+        steady: Its curve; None where no single signal decides its force.
     """
 
     kind: str
@@ -37,6 +55,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     doubt: float = 0.0
     beyond: bool = False
+    steady: Steady | None = None
 
     @property
     def neutral(self) -> dict[str, float]:

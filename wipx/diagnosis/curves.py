@@ -1,93 +1,80 @@
 """The law of an effect as a curve over one signal, and the force that the recordings themselves ask for."""
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 
 from wipx.core.diagnosis import Curve
+from wipx.core.effect import Steady
+from wipx.core.model import Model
 from wipx.core.words import effect_in_words
 from wipx.diagnosis.fitting import Fit
 from wipx.diagnosis.innovations import InnovationFitter
 from wipx.diagnosis.leftover import Shape, leftovers
 from wipx.diagnosis.stand_in import process_mean
+from wipx.effects.catalogue import effect_of
 
 POINTS = 201
-OVER_RATE = (
-    "viscous",
-    "coulomb",
-    "stribeck",
-    "presliding",
-    "quadratic_drag",
-    "asymmetric_coulomb",
-    "lugre",
-    "back_emf",
-)
-OVER_COMMAND = ("gain", "dead_zone", "saturation", "offset")
-OVER_COORDINATE = ("spring", "ripple", "rail_tilt")
+DRIVE = ("offset", "dead_zone", "gain", "saturation")  # in the order in which they act, contract section 3
 
 
 def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
     """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
     plant = fitter.log.plant
-    site, _, kind = effect.partition("/")
-    joint = site if site in plant.joints else plant.actuated[0]
-    signal = _abscissa(kind, plant.joints.index(joint), fitter)
-    shape = next(
-        (s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (plant.joints.index(joint), signal)), None
-    )
+    steady = effect_of(effect, plant).steady
+    if steady is None:
+        return None
+    site = effect.partition("/")[0]
+    joint = plant.joints.index(site if site in plant.joints else plant.actuated[0])
+    signal = _signal(steady, joint, fitter)
+    shape = next((s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (joint, signal)), None)
     if shape is None:
         return None
-    model = completed.hypothesis.model
     at = np.unique(np.concatenate([np.linspace(shape.knots[0], shape.knots[-1], POINTS), [-1e-9, 1e-9]]))
-    law = _force(kind, model.effects[effect], at, _wheel(model.parameters), model.parameters)
     left = leftovers(fitter, reduced, [shape])[0]
     force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
     return Curve(
         effect_in_words(effect, plant.kind),
         shape.signal,
         plant.unit_of(shape.signal),
-        "N m" if plant.is_angular(joint) else "N",
+        "N m" if plant.is_angular(plant.joints[joint]) else "N",
         at,
-        law,
+        added_force(completed.hypothesis.model, effect, at),
         shape.knots,
         force,
         spread,
     )
 
 
-def _abscissa(kind: str, joint: int, fitter: InnovationFitter) -> str | None:
+def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
     plant = fitter.log.plant
-    if kind in OVER_RATE:
+    if steady.over == "rate":
         return plant.rates[joint]
-    if kind in OVER_COORDINATE:
+    if steady.over == "coordinate":
         return plant.coordinates[joint]
-    if kind in OVER_COMMAND:
-        return plant.commands[0 if len(plant.commands) == 1 else joint]
-    return None
+    return plant.commands[0 if len(plant.commands) == 1 else joint]
 
 
-def _wheel(parameters: Mapping[str, float]) -> float:
-    return parameters.get("wheel_radius", 1.0)
+def added_force(model: Model, effect: str, at: np.ndarray) -> np.ndarray:
+    """Force that an effect of a model adds in steady motion [N or N m].
+
+    Args:
+        model: With the effect.
+        effect: One that has a curve.
+        at: Rates, coordinates or commands, shape (N,), in the units of the recordings.
+    """
+    steady = effect_of(effect, model.plant).steady
+    assert steady is not None
+    if steady.over != "command":
+        return steady.force(at, model.effects[effect], model.parameters)
+    without = {name: values for name, values in model.effects.items() if name != effect}
+    return _driven(model, at) - _driven(Model(model.plant, model.parameters, without), at)
 
 
-def _force(kind: str, p: Mapping[str, float], at: np.ndarray, radius: float, body: Mapping[str, float]) -> np.ndarray:
-    """Force that an effect adds over its signal; the laws of contract section 3 in steady motion."""
-    weight = (body.get("body_mass", 0.0) + body.get("wheel_mass", 0.0)) * body["gravity"]
-    laws: dict[str, Callable[[], np.ndarray]] = {
-        "viscous": lambda: -p["sigma"] * at,
-        "back_emf": lambda: -p["k_e"] * at,
-        "coulomb": lambda: -p["F_c"] * np.sign(at),
-        "presliding": lambda: -p["F_c"] * np.sign(at),
-        "stribeck": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
-        "lugre": lambda: -np.sign(at) * (p["F_c"] + (p["F_s"] - p["F_c"]) * np.exp(-((at / p["v_s"]) ** 2))),
-        "quadratic_drag": lambda: -p["c"] * at * np.abs(at),
-        "asymmetric_coulomb": lambda: np.where(at > 0.0, -p["F_plus"], np.where(at < 0.0, p["F_minus"], 0.0)),
-        "gain": lambda: (p["k"] - 1.0) * at,
-        "dead_zone": lambda: -np.clip(at, -p["band"], p["band"]),
-        "saturation": lambda: np.clip(at, -p["F_max"], p["F_max"]) - at,
-        "offset": lambda: np.full_like(at, p["F_0"]),
-        "spring": lambda: -p["k"] * (at - p["x0"]),
-        "ripple": lambda: p["A"] * np.cos(p["n"] * at / radius + p["phase"]),
-        "rail_tilt": lambda: np.full_like(at, -weight * np.sin(p["angle"])),
-    }
-    return laws[kind]()
+def _driven(model: Model, command: np.ndarray) -> np.ndarray:
+    """Force of the drive at constant commands, shape (N,) [N or N m]."""
+    force = command * model.parameters["input_gain"]
+    for name in (f"actuator/{kind}" for kind in DRIVE):
+        if name in model.effects:
+            steady = effect_of(name, model.plant).steady
+            assert steady is not None
+            force = force + steady.force(force, model.effects[name], model.parameters)
+    return force

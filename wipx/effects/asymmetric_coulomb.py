@@ -1,7 +1,14 @@
 """Coulomb friction with one level per direction of motion."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return np.where(rate > 0.0, -p["F_plus"], 0.0) + np.where(rate < 0.0, p["F_minus"], 0.0)
+
 
 EFFECT = Effect(
     kind="asymmetric_coulomb",
@@ -18,4 +25,5 @@ EFFECT = Effect(
     source="Bona, Indri 2005, Friction compensation in robotics: an overview, CDC",
     excludes=("coulomb",),
     beyond=True,
+    steady=Steady("rate", _steady),
 )

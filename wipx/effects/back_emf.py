@@ -4,8 +4,13 @@ The same equation as `viscous` at the driven joint, but part of the motor's forc
 load for `load_friction` and is absent when the motor's leads are open.
 """
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -p["k_e"] * rate
+
 
 EFFECT = Effect(
     kind="back_emf",
@@ -17,4 +22,5 @@ EFFECT = Effect(
     linear_in=("k_e",),
     source="DC motor equation; Duclusaud, Passault 2025, arXiv:2410.08650",
     beyond=True,
+    steady=Steady("rate", _steady),
 )

@@ -1,7 +1,14 @@
 """Coulomb friction: a constant level against the motion, sticking at rest."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -p["F_c"] * np.sign(rate)
+
 
 EFFECT = Effect(
     kind="coulomb",
@@ -10,4 +17,5 @@ EFFECT = Effect(
     law="-F_c s(v), any force in [-F_c, F_c] at v = 0",
     linear_in=("F_c",),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
+    steady=Steady("rate", _steady),
 )

@@ -1,8 +1,15 @@
 """Input dead zone: small commands produce no force."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Effect, Steady
 from wipx.core.law import above, law
 from wipx.core.parameters import Parameter
+
+
+def _steady(command, p, body):
+    return np.vectorize(force)(command, p["band"], 0.0) - command
+
 
 EFFECT = Effect(
     kind="dead_zone",
@@ -11,6 +18,7 @@ EFFECT = Effect(
     law="0 for abs(u) < band, else u - band s(u)",
     linear_in=("band",),
     source="Tao, Kokotovic 1996, Adaptive control of systems with actuator and sensor nonlinearities",
+    steady=Steady("command", _steady),
 )
 
 

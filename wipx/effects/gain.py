@@ -1,7 +1,12 @@
 """Actuator gain: a force constant that differs from the believed one."""
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(command, p, body):
+    return (p["k"] - 1.0) * command
+
 
 EFFECT = Effect(
     kind="gain",
@@ -10,4 +15,5 @@ EFFECT = Effect(
     law="F = k u",
     linear_in=("k",),
     source="torque-constant error, BAM documentation of DC motors, github.com/Rhoban/bam",
+    steady=Steady("command", _steady),
 )

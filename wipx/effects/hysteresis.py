@@ -3,9 +3,16 @@
 With exponent 1 and asymmetry 0 it is the Dahl friction of `presliding`, whose bristle it shares.
 """
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import law, minimum
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -p["F_c"] * np.sign(rate)
+
 
 EFFECT = Effect(
     kind="hysteresis",
@@ -35,6 +42,7 @@ EFFECT = Effect(
     source="Bouc 1967; Wen 1976, Method for random vibration of hysteretic systems, ASCE J. Eng. Mech. 102(2)",
     excludes=("presliding", "lugre"),
     beyond=True,
+    steady=Steady("rate", _steady),
 )
 
 

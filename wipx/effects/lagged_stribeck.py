@@ -14,11 +14,18 @@ How the printed equation was read:
 Unlike `stribeck` this law does not stick: below epsilon there is no friction.
 """
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import decay, law, sign
 from wipx.core.parameters import Parameter
 
 SAMPLE_PERIOD = 1.0 / 650.0  # [s], paper Sec. IV: control loop of 600 to 700 Hz
+
+
+def _steady(rate, p, body):
+    return -np.vectorize(resistance)(rate, p["F_s"], p["F_c"], p["v_s"], p["sigma"], p["epsilon"])
+
 
 EFFECT = Effect(
     kind="lagged_stribeck",
@@ -36,6 +43,7 @@ EFFECT = Effect(
     source="Baek, Sim, Purushottam, Gupta, Ramos 2024, Eq. 5",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding", "lugre", "viscous"),
     beyond=True,
+    steady=Steady("rate", _steady),
 )
 
 

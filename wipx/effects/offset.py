@@ -1,7 +1,14 @@
 """Actuator offset: a constant force beside the command (current-sensor zero, amplifier bias)."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(command, p, body):
+    return np.full_like(command, p["F_0"])
+
 
 EFFECT = Effect(
     kind="offset",
@@ -11,4 +18,5 @@ EFFECT = Effect(
     linear_in=("F_0",),
     source="Wiebe et al. 2022, Torque-limited simple pendulum, JOSS 7(74)",
     beyond=True,
+    steady=Steady("command", _steady),
 )

@@ -1,8 +1,15 @@
 """Pre-sliding friction (Dahl, damped as in LuGre): a bristle bends before the joint slides, and remembers it."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import law, maximum, relaxing
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -p["F_c"] * np.sign(rate)
+
 
 EFFECT = Effect(
     kind="presliding",
@@ -19,6 +26,7 @@ EFFECT = Effect(
     ),
     source="Dahl 1968, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1; Canudas de Wit et al. 1995",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "lugre"),
+    steady=Steady("rate", _steady),
 )
 
 

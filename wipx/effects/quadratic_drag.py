@@ -1,8 +1,15 @@
 """Quadratic drag: a force against the motion, proportional to the square of the speed."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import law
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return np.vectorize(force)(rate, p["c"])
+
 
 EFFECT = Effect(
     kind="quadratic_drag",
@@ -11,6 +18,7 @@ EFFECT = Effect(
     law="-c v abs(v)",
     linear_in=("c",),
     source="Kaheman, Kaiser, Strom, Kutz, Brunton 2019, arXiv:1909.08574",
+    steady=Steady("rate", _steady),
 )
 
 

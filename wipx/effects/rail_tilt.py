@@ -1,7 +1,15 @@
 """A rail that is not level: gravity pulls along it."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(place, p, body):
+    weight = (body.get("body_mass", 0.0) + body["wheel_mass"]) * body["gravity"]
+    return np.full_like(place, -weight * np.sin(p["angle"]))
+
 
 EFFECT = Effect(
     kind="rail_tilt",
@@ -15,4 +23,5 @@ EFFECT = Effect(
     linear_in=("angle",),
     source="rigid-body mechanics",
     needs=("translation",),
+    steady=Steady("coordinate", _steady),
 )

@@ -1,7 +1,14 @@
 """Torque ripple (cogging): a force periodic in the motor's angle."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(place, p, body):
+    return p["A"] * np.cos(p["n"] * place / body.get("wheel_radius", 1.0) + p["phase"])
+
 
 EFFECT = Effect(
     kind="ripple",
@@ -22,4 +29,5 @@ EFFECT = Effect(
     law="+ A cos(n x/r + phase)",
     linear_in=("A",),
     source="Holtz, Springob 1996, Identification and compensation of torque ripple, IEEE TIE 43(2)",
+    steady=Steady("coordinate", _steady),
 )

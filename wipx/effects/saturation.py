@@ -1,8 +1,15 @@
 """Saturation of the actuator's force."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Effect, Steady
 from wipx.core.law import above, law
 from wipx.core.parameters import Parameter
+
+
+def _steady(command, p, body):
+    return np.vectorize(force)(command, p["F_max"], 0.0) - command
+
 
 EFFECT = Effect(
     kind="saturation",
@@ -20,6 +27,7 @@ EFFECT = Effect(
     ),
     law="F = clip(u, -F_max, F_max)",
     source="force range of actuators, MuJoCo documentation",
+    steady=Steady("command", _steady),
 )
 
 

@@ -1,7 +1,12 @@
 """A spring on the carriage: cable, hose or bumper."""
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(place, p, body):
+    return -p["k"] * (place - p["x0"])
+
 
 EFFECT = Effect(
     kind="spring",
@@ -14,4 +19,5 @@ EFFECT = Effect(
     linear_in=("k",),
     source="rigid-body mechanics",
     needs=("translation",),
+    steady=Steady("coordinate", _steady),
 )

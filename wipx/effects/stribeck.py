@@ -1,8 +1,15 @@
 """Stribeck friction: a level that falls from static to Coulomb as the speed rises."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+import numpy as np
+
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import decay, law, maximum
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -np.sign(rate) * (p["F_c"] + np.vectorize(bump)(rate, p["F_s"], p["F_c"], p["v_s"]))
+
 
 EFFECT = Effect(
     kind="stribeck",
@@ -19,6 +26,7 @@ EFFECT = Effect(
     ),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
     excludes=("coulomb", "asymmetric_coulomb"),
+    steady=Steady("rate", _steady),
 )
 
 

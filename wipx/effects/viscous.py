@@ -1,7 +1,12 @@
 """Viscous friction: a force against the motion, proportional to speed."""
 
-from wipx.core.effect import JOINT_SITES, Effect
+from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
+
+
+def _steady(rate, p, body):
+    return -p["sigma"] * rate
+
 
 EFFECT = Effect(
     kind="viscous",
@@ -10,4 +15,5 @@ EFFECT = Effect(
     law="-sigma v",
     linear_in=("sigma",),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
+    steady=Steady("rate", _steady),
 )
