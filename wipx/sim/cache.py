@@ -1,12 +1,15 @@
 """Where compiled kernels are kept between runs.
 
-numba notices a change of the kernel's own file only, not of what it calls in other modules; the cache folder is
-therefore named after the sources of all modules that have compiled code. NUMBA_CACHE_DIR moves it.
+numba notices a change of the kernel's own file only, not of what it takes from other modules. The cache folder is
+therefore named after the sources of all compiled functions and of everything that these take from other modules.
+NUMBA_CACHE_DIR moves it.
 """
 
+import ast
 import hashlib
 import os
 import tempfile
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,19 +19,41 @@ from numba.core import config as numba_settings
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "concealed"  # folder whose code is its own, and which nothing else may open
-COMPILED = ("wipx.sim.cache import cached", "wipx.core.law import", "wipx.sim import rows")  # marks of such modules
+COMPILED = ("cached", "law", "inlined")  # decorators
 
 
 def sources_digest(package: Path) -> str:
-    """Digest of the sources of all modules of a package that have compiled code, or constants of it."""
-    digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        if source.parent.name == UNSEEN:
-            continue
-        text = source.read_bytes()
-        if source.parent.name in ("core", "effects", "sim") or any(mark.encode() in text for mark in COMPILED):
-            digest.update(text)
-    return digest.hexdigest()[:16]
+    """Digest of the sources of a package's compiled functions, and of the modules that these take names from."""
+    marks = [f"@{name}\n" for name in COMPILED]
+    todo = [path for path in package.rglob("*.py") if path.parent.name != UNSEEN]
+    todo = [path for path in todo if any(mark in path.read_text(encoding="utf-8") for mark in marks)]
+    found: set[Path] = set()
+    while todo:
+        path = todo.pop()
+        if path not in found and path.is_file():
+            found.add(path)
+            todo += _taken_from(path, package)
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(found))).hexdigest()[:16]
+
+
+def _taken_from(source: Path, package: Path) -> Iterator[Path]:
+    """Modules of the package from which the compiled functions and the constants of a source take names."""
+    tree = ast.parse(source.read_bytes())
+    users = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign) or _is_compiled(node)]
+    names = {node.id for user in users for node in ast.walk(user) if isinstance(node, ast.Name)}
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] == "wipx":
+            folder = package.joinpath(*node.module.split(".")[1:])
+            for alias in node.names:
+                if (alias.asname or alias.name) in names:
+                    yield folder.with_suffix(".py")
+                    yield folder / f"{alias.name}.py"
+
+
+def _is_compiled(node: ast.stmt) -> bool:
+    return isinstance(node, ast.FunctionDef) and any(
+        isinstance(decorator, ast.Name) and decorator.id in COMPILED for decorator in node.decorator_list
+    )
 
 
 @cache
