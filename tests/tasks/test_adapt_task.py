@@ -56,6 +56,16 @@ def test_a_finished_job_is_not_repeated_and_one_with_other_settings_is_refused(p
     assert "seed (0 before, 7 now)" in other.error
 
 
+def test_a_robot_emulated_by_another_simulator_is_recorded_anew(
+    program: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    for simulator in ("before", "before", "after"):
+        monkeypatch.setattr("wipx.tasks.trials.simulator_digest", lambda simulator=simulator: simulator)
+        run = program("task=adapt", "method=pure_sim", *ROBOT, f"hydra.run.dir={simulator}")
+        assert run.status == 0, run.error
+    assert len([folder for folder in (tmp_path / "runs" / "trials").iterdir() if folder.is_dir()]) == 2
+
+
 @pytest.mark.slow
 def test_a_sweep_gives_a_table_and_one_with_a_failed_job_does_not(program: Program, tmp_path: Path):
     sweep = ("task=adapt", *ROBOT, "name=gap", "label='${hydra:runtime.choices.method}'", *SEARCH, "-m")

@@ -110,14 +110,18 @@ def test_random_numbers_are_drawn_afresh_for_every_robot(trials: Path, datasets:
     }
 
 
-def test_whatever_decides_a_training_set_makes_another_one(trials: Path, datasets: Path):
+def test_whatever_decides_a_training_set_makes_another_one(
+    trials: Path, datasets: Path, monkeypatch: pytest.MonkeyPatch
+):
     path = trials / "left_1.csv"
     training_set_of(job(trials, datasets), SMALL)
     training_set_of(job(trials, datasets), replace(SMALL, lean=1e-3))
     training_set_of(replace(job(trials, datasets), seed=1), SMALL)
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
     training_set_of(job(trials, datasets), SMALL)
-    assert len(list(datasets.glob("*.parquet"))) == 4
+    monkeypatch.setattr("wipx.tasks.dataset.simulator_digest", lambda: "of another simulator")
+    training_set_of(job(trials, datasets), SMALL)
+    assert len(list(datasets.glob("*.parquet"))) == 5
 
 
 def test_a_robot_without_controller_is_refused(trials: Path, datasets: Path):

@@ -36,6 +36,12 @@ def sources_digest(package: Path) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(found))).hexdigest()[:16]
 
 
+def simulator_digest(package: Path = PACKAGE) -> str:
+    """Digest of the sources of the laws and of the engines: what was simulated with others is to be made anew."""
+    sources = sorted(path for folder in ("effects", "sim") for path in (package / folder).rglob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+
+
 def _taken_from(source: Path, package: Path) -> Iterator[Path]:
     """Modules of the package from which the compiled functions and the constants of a source take names."""
     tree = ast.parse(source.read_bytes())

@@ -19,6 +19,7 @@ from wipx.learn.loads import LoadRanges
 from wipx.learn.training_set import PARTS, TrainingSet
 from wipx.recordings.model_file import model_from_mapping, read_model
 from wipx.report.numbers import significant
+from wipx.sim.cache import simulator_digest
 from wipx.sim.simulator import StateFeedback
 from wipx.tasks.adapted import adaptation_problem, adapted_simulation, loaded_trials
 from wipx.tasks.finished import finish, finished
@@ -186,6 +187,7 @@ def _digest(job: Job, settings: Dataset, trials: LoadedTrials) -> str:
     deciding = {key: job.settings[key] for key in DECIDING}
     deciding["model"] = None if job.model_path is None else _plain(read_model(job.model_path))
     deciding |= {"seed": job.seed, "dataset": asdict(settings), "loop": [feedback.gains.tolist(), rate]}
+    deciding["simulator"] = simulator_digest()
     digest = hashlib.sha256(json.dumps(deciding, sort_keys=True).encode())
     for recording, load in zip(trials.recordings, trials.loads, strict=True):
         digest.update(f"{recording.name} {load}".encode())

@@ -20,6 +20,7 @@ from wipx.hardware.target import Target, Trial
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
+from wipx.sim.cache import simulator_digest
 from wipx.tasks.job import Job
 from wipx.tasks.locked import locked
 from wipx.tasks.results import write_csv
@@ -58,7 +59,7 @@ def trials_of(job: Job, plan: TrialPlan) -> RecordingSource:
     target = job.part("target")
     if isinstance(target, RecordingSource):
         return target
-    folder = FOLDER / _digest(job, plan)
+    folder = FOLDER / _digest(job, plan, target)
     with locked(folder / ".lock"):
         _record(job, target, plan, folder)
     return RecordingSource(path=str(folder), title=f"trials of {type(target).__name__}")
@@ -123,8 +124,10 @@ def write_recording(path: Path, recording: Recording) -> None:
     draft.replace(path)
 
 
-def _digest(job: Job, plan: TrialPlan) -> str:
+def _digest(job: Job, plan: TrialPlan, target: Target) -> str:
     """Short name of everything that decides what is recorded."""
     deciding = {group: job.settings[group] for group in DECIDING}
     deciding["plan"] = [plan.per_load, plan.duration, plan.seed]
+    if isinstance(target, EmulatedTestbed):
+        deciding["simulator"] = simulator_digest()
     return hashlib.sha256(json.dumps(deciding, sort_keys=True).encode()).hexdigest()[:12]
