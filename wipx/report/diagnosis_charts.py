@@ -48,13 +48,23 @@ def titled_curves(diagnosis: Diagnosis) -> tuple[TitledCurve, ...]:
 
 
 def ranked_candidates(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
-    """What was considered, the largest gain first; those without a known gain last."""
-    return tuple(sorted(diagnosis.candidates, key=lambda c: -c.gain if math.isfinite(c.gain) else math.inf))
+    """What was considered, each once, the largest gain first; those without a known gain last.
+
+    An effect of the answer has its gain there, others the largest that they had in the search.
+    """
+    found: dict[str, Candidate] = {}
+    for candidate in diagnosis.candidates:
+        before = found.get(candidate.name)
+        if not candidate.chosen and (before is None or not before.gain >= candidate.gain):
+            found[candidate.name] = candidate
+    for effect in diagnosis.effects:
+        found[effect.name] = Candidate(effect.name, effect.log_evidence_gain, True, "part of the answer")
+    return tuple(sorted(found.values(), key=lambda c: -c.gain if math.isfinite(c.gain) else math.inf))
 
 
 def full_bar(diagnosis: Diagnosis) -> float:
     """The gain of a bar of full length [nats]."""
-    return max([LEAST_FULL_BAR, *(c.gain for c in diagnosis.candidates if math.isfinite(c.gain))])
+    return max([LEAST_FULL_BAR, *(c.gain for c in ranked_candidates(diagnosis) if math.isfinite(c.gain))])
 
 
 def bar_length(gain: float, largest: float) -> float:
