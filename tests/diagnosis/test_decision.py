@@ -27,7 +27,7 @@ def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: 
     monkeypatch.setattr(numbers, "shift_by_step", all_of_it)
     answer = robot.diagnosed()
     assert "translation/viscous" not in {effect.name for effect in answer.effects}
-    assert any(c.reason == "has a size that may as well be nothing" for c in answer.candidates)
+    assert any(c.reason == "has a size that cannot be told from zero" for c in answer.candidates)
 
 
 @pytest.mark.parametrize(("averaged", "verdict"), [(False, "unexplained"), (True, "consistent")])

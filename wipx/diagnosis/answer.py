@@ -227,7 +227,7 @@ def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
         for name in effect.equivalent:
             found.append(f"{effect.name} cannot be told from {name}")
         if effect.heldout_gain < 0.0:
-            found.append(f"{effect.name} with numbers fitted to the other recordings predicts a recording no better")
+            found.append(f"{effect.name}: fitted to all recordings but one, it does not predict that one better")
     return tuple(found)
 
 

@@ -33,7 +33,7 @@ IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not ma
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 GIVEN_UP = 0.1  # of that effect's gain, that they may lack
 MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-SMALL_PRINT = 150.0  # nats; what gains more is neither the small print of another law nor its kinks
+SMALL_PRINT = 150.0  # nats; what gains more is no misfit of another law
 VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
@@ -62,7 +62,7 @@ def decided(inquiry: Inquiry, selection: Selection, chosen: Fit) -> tuple[Rest, 
     """What is kept of the effects that the selection chose, what they leave over, and the shapes it was looked for in.
 
     Small effects that held-out predictions do not show are kept where something is left without them and nothing
-    with them: what is left is no small print of another law then.
+    with them: what is left is then no misfit of another law.
     """
     told = len(selection.considered)
     kept = confirmed(inquiry, selection, chosen)
@@ -106,7 +106,7 @@ def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float =
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
             reason = "changes no prediction to speak of"
         elif effect in uncertain and (gain < SMALL_PRINT or not rough.is_rough(fit)):
-            reason = "has a size that may as well be nothing"
+            reason = "has a size that cannot be told from zero"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
         elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < visible:

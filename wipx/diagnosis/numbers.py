@@ -17,7 +17,7 @@ from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
 
 NINETY_FIVE = 1.96  # standard deviations
-LAW_MISFIT = 5e-4  # share of the evidence that may be the small print of a law; widens intervals
+LAW_MISFIT = 5e-4  # share of the evidence that a law may miss though it is the right one; widens intervals
 UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
 NUDGE = 0.05  # relative change of the spread, to see what it does
 WIDE = 0.3  # relative half width of an interval from which a number is called weak
