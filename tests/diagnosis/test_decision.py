@@ -7,6 +7,7 @@ from diagnosis.recorded import Bench, bench, slow
 from wipx.core.plant import plant_of
 from wipx.diagnosis import decision, numbers
 from wipx.diagnosis.fitting import Fit, Fitter
+from wipx.diagnosis.forecasts import ForecastFitter
 from wipx.diagnosis.hypothesis import Hypothesis
 from wipx.diagnosis.inquiry import Inquiry
 from wipx.diagnosis.leftover import Leftover, Shape
@@ -25,6 +26,7 @@ def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: 
         return np.abs(fit.hypothesis.cube - fit.hypothesis.space.neutral)
 
     monkeypatch.setattr(numbers, "shift_by_step", all_of_it)
+    monkeypatch.setattr(ForecastFitter, "is_possible", False)  # innovations alone decide
     answer = robot.diagnosed()
     assert "translation/viscous" not in {effect.name for effect in answer.effects}
     assert any(c.reason == "has a size that cannot be told from zero" for c in answer.candidates)
