@@ -24,12 +24,12 @@ from wipx.concealed.dirty_score import alike
 from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.case import in_two
-from wipx.diagnosis.fitting import LEAST_GAIN, Fit, Fitter
-from wipx.diagnosis.forecasts import HORIZONS, ForecastFitter
-from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.inquiry import HORIZON, Inquiry
-from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.decision.context import HORIZON, Inquiry
+from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.forecasts import HORIZONS, ForecastFitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.pipeline import in_two
+from wipx.diagnosis.selection.search import Selection
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of

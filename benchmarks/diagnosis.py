@@ -11,13 +11,13 @@ from wipx.control.lqr import Lqr
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
-from wipx.diagnosis.case import Robot, diagnose
-from wipx.diagnosis.follower import Follower
-from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.innovations import InnovationFitter
-from wipx.diagnosis.log import Log
-from wipx.diagnosis.observer import NoiseLevels, observer_gains
-from wipx.diagnosis.whiteness import colour_of
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.noise_model import colour_of
+from wipx.diagnosis.likelihood.observer import NoiseLevels, observer_gains
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.pipeline import Robot, diagnose
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs

@@ -20,7 +20,16 @@ LAYERS = (
     {"app"},
     {"__main__"},
 )
+DIAGNOSIS = (
+    {"likelihood"},
+    {"candidates", "residuals", "next_experiment"},
+    {"selection"},
+    {"decision"},
+    {"answer"},
+    {"pipeline"},
+)
 RANK = {room: rank for rank, layer in enumerate(LAYERS) for room in layer}
+RANK_IN_DIAGNOSIS = {room: rank for rank, layer in enumerate(DIAGNOSIS) for room in layer}
 ALLOWED_IN = {
     "mlflow": {"tracking"},
     "hydra": {"config", "app", "__main__"},
@@ -60,3 +69,12 @@ def test_imports_point_one_way(path: Path):
         if package == "wipx" and inner[0] != room:
             assert RANK[inner[0]] < RANK[room], f"{room} must not import {name}"
             assert room != "report" or inner[0] == "core", f"report reads finished results only, not {name}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "diagnosis").rglob("*.py")), ids=lambda path: path.stem)
+def test_rooms_of_the_diagnosis_are_used_in_one_order(path: Path):
+    room = path.relative_to(PACKAGE / "diagnosis").with_suffix("").parts[0]
+    for name in _imports(path):
+        if name.startswith("wipx.diagnosis."):
+            other = name.split(".")[2]
+            assert other == room or RANK_IN_DIAGNOSIS[other] < RANK_IN_DIAGNOSIS[room], f"{room} must not import {name}"

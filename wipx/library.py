@@ -8,7 +8,7 @@ import numpy as np
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
 from wipx.core.recording import Recording
-from wipx.diagnosis.case import Robot, diagnose
+from wipx.diagnosis.pipeline import Robot, diagnose
 from wipx.recordings.robot_file import RobotDescription, read_robot
 from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator

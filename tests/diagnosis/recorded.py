@@ -12,14 +12,14 @@ from identify.emulated_robot import BODIES, RATE, Effects, Robot, controller, no
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.case import Robot as KnownRobot
-from wipx.diagnosis.case import diagnose
-from wipx.diagnosis.fitting import Fit
-from wipx.diagnosis.follower import Follower
-from wipx.diagnosis.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.innovations import InnovationFitter
-from wipx.diagnosis.log import Log
-from wipx.diagnosis.observer import NoiseLevels
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.observer import NoiseLevels
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.pipeline import Robot as KnownRobot
+from wipx.diagnosis.pipeline import diagnose
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wipx.core.recording import Recording
-from wipx.diagnosis.caveats import caveats
+from wipx.diagnosis.answer.caveats import caveats
 
 
 def recording(name: str, t: np.ndarray) -> Recording:

@@ -7,7 +7,7 @@ from identify.emulated_robot import Effects, nominal_model
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.results import Estimate
-from wipx.diagnosis.robust import covariance
+from wipx.diagnosis.likelihood.sandwich import covariance
 
 KINDS = ("wip", "cartpole", "pendulum", "linear_axis", "double_pendulum")
 LOGS = {"coloured noise": coloured, "coarse encoders": coarse, "lost rows": dropped, "jitter": jittered, "slow": slow}

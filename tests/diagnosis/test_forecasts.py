@@ -8,11 +8,11 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.case import Robot, diagnose
-from wipx.diagnosis.fitting import ALIKE, Fit
-from wipx.diagnosis.forecasts import ForecastFitter, condensed
-from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.selection import Selection
+from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.pipeline import Robot, diagnose
+from wipx.diagnosis.selection.search import Selection
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 

@@ -5,7 +5,7 @@ import pytest
 from diagnosis.recorded import bench
 
 from wipx.core.model import ModelBatch
-from wipx.diagnosis.location import excess_of
+from wipx.diagnosis.answer.location import excess_of
 
 
 def test_shares_of_sites_sum_to_one(fresh_seed: int):

@@ -9,8 +9,8 @@ from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.screening import prospects_of_effect
+from wipx.diagnosis.candidates.screening import prospects_of_effect
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.sim.inputs import Inputs
 
 NOISE = 1.5  # [N] of the single commands, as a controller makes of noisy rates

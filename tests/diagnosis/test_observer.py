@@ -15,10 +15,10 @@ from sim.robots import unit_axis
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.innovations import InnovationFitter
-from wipx.diagnosis.log import SETTLES, Log
-from wipx.diagnosis.observer import BEFORE, DIFFUSE, UNSETTLED, Gains, NoiseLevels, observer_gains
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.observer import BEFORE, DIFFUSE, UNSETTLED, Gains, NoiseLevels, observer_gains
+from wipx.diagnosis.likelihood.recording_batch import SETTLES, Log
 from wipx.identify.linearisation import Linearisation, linearise_along, transition_over
 from wipx.sim.analytic import Observer
 from wipx.sim.inputs import Inputs
@@ -28,7 +28,7 @@ LEVELS = NoiseLevels(np.array([0.02]), np.array([1e-4]))  # [N s^0.5, m]
 FOLLOW = """
 import sys
 from diagnosis.recorded import bench
-from wipx.diagnosis.leftover import leftovers, shapes_of
+from wipx.diagnosis.residuals.residual_tests import leftovers, shapes_of
 case = bench(sys.argv[1], {}, 0, duration=0.2)
 fit = case.fit()
 leftovers(case.fitter, fit, shapes_of(case.fitter, fit))

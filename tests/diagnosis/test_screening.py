@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench
 
-from wipx.diagnosis.hypothesis import Hypothesis
-from wipx.diagnosis.screening import Prospect, prospects
+from wipx.diagnosis.candidates.screening import Prospect, prospects
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 
 SMALL = {  # each worth some tens of nats in these recordings
     "translation/coulomb": ("wip", {"F_c": 8e-3}),

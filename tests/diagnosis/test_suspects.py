@@ -9,10 +9,10 @@ from diagnosis.recorded import Bench, bench
 from wipx.core.diagnosis import Diagnosis, Suspect, SuspectedSize
 from wipx.core.errors import InputError
 from wipx.core.results import Estimate
-from wipx.diagnosis.suspect_sentence import suspect_sentence
-from wipx.diagnosis.suspects import check_suspects
+from wipx.diagnosis.answer.suspects import check_suspects
 from wipx.effects.remainder import KNOTS
 from wipx.report.diagnosis_json import diagnosis_json
+from wipx.report.suspect_sentence import suspect_sentence
 
 LEVEL = 0.5  # of the axis's Coulomb friction [N]
 SIGMA = 3.0  # of a viscous friction that it does not have [N s/m]

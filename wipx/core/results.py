@@ -51,6 +51,21 @@ class FitErrors:
     completed: Mapping[str, float]
     noise_floor: Mapping[str, float]
 
+    @property
+    def explained_share(self) -> float:
+        """Share of the explainable squared error that the completed model removes."""
+        removed = total = 0.0
+        for name, floor in self.noise_floor.items():
+            scale = max(floor, 1e-12) ** 2
+            total += max(self.nominal[name] ** 2 - floor**2, 0.0) / scale
+            removed += max(self.nominal[name] ** 2 - max(self.completed[name] ** 2, floor**2), 0.0) / scale
+        return removed / total if total > 0.0 else 0.0
+
+    @property
+    def times_the_floor(self) -> float:
+        """The largest error of the completed model over its noise floor."""
+        return max(self.completed[name] / max(floor, 1e-15) for name, floor in self.noise_floor.items())
+
 
 @dataclass(frozen=True)
 class Trace:

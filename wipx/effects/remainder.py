@@ -1,7 +1,7 @@
 """A force, gain or dry friction that no physics is known for: piecewise linear over one signal.
 
 It stands in for what a diagnosis cannot name. Its curve is drawn from a Gaussian process prior in
-`wipx.diagnosis.stand_in`; here it is only evaluated.
+`wipx.diagnosis.residuals.discrepancy`; here it is only evaluated.
 """
 
 from wipx.core.effect import JOINT_SITES, Effect

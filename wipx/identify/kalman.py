@@ -100,10 +100,10 @@ def gains_along(
         late: Delay of each sensor, shape (joints,) [s].
     """
     moves = _moves(linear.a, linear.place, t, last)
-    rows, recordings, n = moves.shape[:3]
-    gains = np.zeros((rows, recordings, n, len(late)))
+    n = 3 * len(late)
+    gains = np.zeros((*t.shape, n, len(late)))
     covariance = np.zeros_like(moves)
-    innovation = np.zeros((rows, recordings, len(late), len(late)))
+    innovation = np.zeros((*t.shape, len(late), len(late)))
     _filter(moves, t, last, sensor**2, rate, late, gains, covariance, innovation)
     return Gains(moves, gains, covariance, innovation)
 

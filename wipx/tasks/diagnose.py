@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
-from wipx.diagnosis.case import Robot, diagnose
+from wipx.diagnosis.pipeline import Robot, diagnose
 from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource

@@ -17,8 +17,8 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.model import Model
 from wipx.core.recording import Recording, RecordingSplit
-from wipx.diagnosis.inquiry import HORIZON
-from wipx.diagnosis.suspects import check_suspects
+from wipx.diagnosis.answer.suspects import check_suspects
+from wipx.diagnosis.decision.context import HORIZON
 from wipx.identify.parameter_space import scales_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource

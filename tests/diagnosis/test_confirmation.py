@@ -1,0 +1,75 @@
+"""What is named at last: no size that may be nothing, no swing that means feign, no rich law without need."""
+
+import numpy as np
+import pytest
+from diagnosis.recorded import Bench, bench, slow
+
+from wipx.core.plant import plant_of
+from wipx.diagnosis.decision import confirmation, estimates
+from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.residuals.residual_tests import Leftover, Shape
+from wipx.diagnosis.selection.nested_laws import simple_law
+from wipx.diagnosis.selection.search import Selection
+
+WIP = plant_of("wip")
+
+
+@pytest.mark.slow
+def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    robot = bench("linear_axis", {"translation/viscous": {"sigma": 1.0}}, fresh_seed)
+    assert [effect.name for effect in robot.diagnosed().effects] == ["translation/viscous"]
+
+    def all_of_it(fitter: Fitter, fit: Fit) -> np.ndarray:
+        return np.abs(fit.hypothesis.cube - fit.hypothesis.space.neutral)
+
+    monkeypatch.setattr(estimates, "shift_by_step", all_of_it)
+    monkeypatch.setattr(ForecastFitter, "is_possible", False)  # innovations alone decide
+    answer = robot.diagnosed()
+    assert "translation/viscous" not in {effect.name for effect in answer.effects}
+    assert any(c.reason == "has a size that cannot be told from zero" for c in answer.candidates)
+
+
+@pytest.mark.parametrize(("averaged", "verdict"), [(False, "unexplained"), (True, "consistent")])
+def test_means_of_commands_may_feign_what_swings(
+    averaged: bool, verdict: str, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
+):
+    def seeming(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+        shape = next(shape for shape in shapes if shape.kind == "resonance")
+        return [Leftover(shape, 100.0, 1e-12, np.zeros((fit.white.size, 2)))]
+
+    monkeypatch.setattr(confirmation, "leftovers", seeming)
+    robot = bench("linear_axis", {}, fresh_seed)
+    means = slow(robot.recordings, np.random.default_rng(fresh_seed))
+    answer = Bench(robot.nominal, means if averaged else robot.recordings, {}).diagnosed()
+    assert answer.verdict == verdict  # the law of a resonance, fitted, gains nothing in either log
+
+
+def test_a_rich_law_has_a_simple_one_where_there_is_room():
+    assert simple_law("pitch/presliding", (), WIP) == "pitch/coulomb"
+    assert simple_law("pitch/presliding", ("translation/coulomb",), WIP) == "pitch/coulomb"
+    assert simple_law("pitch/presliding", ("pitch/coulomb",), WIP) is None
+    assert simple_law("pitch/sticky_spot", ("pitch/stribeck",), WIP) is None  # which excludes Coulomb friction
+    assert simple_law("pitch/viscous", (), WIP) is None
+
+
+@pytest.mark.slow
+def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
+    robot = bench("linear_axis", hidden, fresh_seed)
+    monkeypatch.setattr(Inquiry, "heldout_gain", lambda self, repeated, reduced: 0.0)  # nothing shows
+    answer = robot.diagnosed()
+    assert {effect.name for effect in answer.effects} == set(hidden)
+    assert answer.verdict == "mismatch"
+
+
+def test_one_effect_takes_the_place_of_two_that_imitate_it(fresh_seed: int):
+    case = bench("wip", {"sensor_theta/scale": {"e": 0.06}}, fresh_seed)
+    selection = Selection(case.fitter, case.setting, case.fit())
+    rescaled = {"sensor_x/scale.e": -0.06, "actuator/gain.k": 1.06}  # a linear robot looks the same at another scale
+    hypothesis = Hypothesis.of(case.setting, ("sensor_x/scale", "actuator/gain"), rescaled)
+    two = case.fitter.polished(case.fitter.fit(hypothesis, selection.nominal.levels))
+    assert selection.evidence(selection.nominal, two) > 100.0
+    assert selection.exchanged(two).effects == ("sensor_theta/scale",)

@@ -1,0 +1,54 @@
+"""How much a drive gives at most is found wherever the limit is, also where commands are no forces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis.recorded import Bench, bench
+
+from wipx.core.recording import Recording
+from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
+from wipx.diagnosis.candidates.screening import basis_of
+
+GAIN = 12.5  # N per unit of a command without unit
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+@pytest.mark.parametrize("gain", [1.0, GAIN])
+def test_a_saturation_is_found_where_it_is(share: float, gain: float, fresh_seed: int):
+    truth = share * np.abs(bench("linear_axis", {}, fresh_seed).recordings[0]["u"]).max()
+    case = bench("linear_axis", {"actuator/saturation": {"F_max": float(truth)}}, fresh_seed)
+    found = guesses(saturations, in_units(case, gain))[:, 0]
+    assert np.abs(np.log(found / truth)).min() < 0.15
+
+
+def test_a_torque_speed_line_is_found_where_it_is(fresh_seed: int):
+    usual = bench("linear_axis", {}, fresh_seed).recordings[0]
+    truth = {
+        "F_stall": 0.7 * float(np.abs(usual["u"]).max()),
+        "v_free": 1.2 * float(np.abs(np.gradient(usual["x"], usual.t)).max()),
+    }
+    case = bench("linear_axis", {"actuator/speed_limit": truth}, fresh_seed)
+    found = guesses(speed_limits, case)
+    assert np.abs(np.log(found / list(truth.values()))).max(axis=1).min() < 0.35
+
+
+def test_a_drive_that_gives_all_it_is_asked_for_shows_hardly_a_limit(fresh_seed: int):
+    case = bench("linear_axis", {}, fresh_seed)
+    largest = max(np.abs(r["u"]).max() for r in case.recordings)
+    assert all(limit > 0.5 * largest for (limit,) in guesses(saturations, case))
+
+
+def in_units(case: Bench, gain: float) -> Bench:
+    """The same recordings with commands in a unit of their own."""
+    recordings = tuple(
+        Recording(r.name, {**r.columns, "u": r["u"] / gain}, r.source, r.periods) for r in case.recordings
+    )
+    nominal = replace(case.nominal, parameters={**case.nominal.parameters, "input_gain": gain})
+    return Bench(nominal, recordings, {})
+
+
+def guesses(scan, case: Bench) -> np.ndarray:
+    """What a scan makes of what the nominal model leaves."""
+    fit = case.fit()
+    return scan(case.fitter, fit, basis_of(fit))

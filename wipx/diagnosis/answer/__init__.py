@@ -1,0 +1,1 @@
+"""What is told: location, curves, ties, and the user's own suspicions."""

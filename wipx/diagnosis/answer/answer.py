@@ -1,0 +1,273 @@
+"""The answer put together: effects with numbers and rivals, what is unexplained or weak, and what to record next."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from wipx.core.diagnosis import (
+    Alternative,
+    Candidate,
+    Combined,
+    Diagnosis,
+    FoundEffect,
+    NextExperiment,
+    Remainder,
+    Unexplained,
+    Verdict,
+)
+from wipx.core.model import Model
+from wipx.core.results import Estimate, FitErrors, Trace
+from wipx.core.words import effect_in_words
+from wipx.diagnosis.answer.combined_laws import combined
+from wipx.diagnosis.answer.law_curves import law_curve
+from wipx.diagnosis.answer.location import located
+from wipx.diagnosis.decision.confirmation import Rest
+from wipx.diagnosis.decision.context import FAR_FROM_THE_FLOOR, FAR_OFF, Inquiry
+from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
+from wipx.diagnosis.decision.held_out import Transfer, judged, transfer
+from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.sandwich import inflation
+from wipx.diagnosis.next_experiment.choice import Question, next_experiment
+from wipx.diagnosis.residuals.discrepancy import curve_of
+from wipx.diagnosis.residuals.remaining_forces import horizon_errors, left_forces
+from wipx.diagnosis.residuals.residual_tests import Shape
+from wipx.diagnosis.selection.nested_laws import CONTAINS, simpler
+from wipx.diagnosis.selection.search import Selection
+from wipx.effects.catalogue import effect_of
+from wipx.report.diagnosis_sentence import sentence
+from wipx.sim.simulator import StateFeedback
+
+CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
+
+
+def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
+    """Everything a person wants to know."""
+    nominal, fit = inquiry.setting.nominal, rest.fit
+    repeated = transfer(inquiry.fitter, fit)
+    judge = inquiry.judge
+    trusted = judge.tuned(nominal, inquiry.recordings)
+    # where nothing is named, predictions learn how far to trust the model, as those of the nominal one do
+    model = replace(fit.hypothesis.model, bandwidths=(judge.bandwidths or {}) if fit.effects else nominal.bandwidths)
+    held_out, traces = judged(judge, trusted, repeated.models, inquiry.recordings)
+    fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
+    ends = estimates(inquiry.fitter, fit, selection.nominal)
+    effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
+    left = rest.significant or (fitted.times_the_floor > FAR_OFF and not inquiry.is_quiet(fit))
+    matters = left and fitted.times_the_floor > FAR_FROM_THE_FLOOR
+    verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
+    unexplained = replace(_unexplained(inquiry, rest), significant=left)
+    as_one = () if rest.significant else combined(inquiry, selection, fit)
+    before, after = (inquiry.fitter.seen_by_row(each)[1] for each in (selection.nominal, fit))
+    location = located(inquiry.by_row, before, after, effects, unexplained.site)
+    draft = Diagnosis(
+        title="",
+        source="",
+        units=_units(inquiry),
+        verdict=verdict,
+        sentence="",
+        nominal=nominal,
+        model=model,
+        effects=effects,
+        corrected=tuple(e for e in ends if e.name in inquiry.setting.uncertainty),
+        location=location,
+        fit=fitted,
+        held_out=held_out,
+        unexplained=unexplained,
+        candidates=tuple(_in_hindsight(candidate, fit) for candidate in selection.considered),
+        bounds=bounds(selection.prospects_of(fit), inquiry.log.plant),
+        weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
+        next_experiment=None,
+        traces=traces,
+        notes=(),
+        seconds=0.0,
+        combined=as_one,
+        remainder=_remainder(inquiry, model, held_out, traces, matters=matters),
+    )
+    return replace(draft, sentence=sentence(draft))
+
+
+def _remainder(
+    inquiry: Inquiry, model: Model, held_out: FitErrors, traces: tuple[Trace, ...], *, matters: bool
+) -> Remainder:
+    """How much stays, and what it looks like."""
+    floors = {name: max(floor, 1e-15) for name, floor in held_out.noise_floor.items()}
+    return Remainder(
+        held_out.explained_share,
+        {name: held_out.completed[name] / floor for name, floor in floors.items()},
+        matters,
+        horizon_errors(traces),
+        left_forces(inquiry.by_row.simulator, inquiry.log, inquiry.judge.noise, model),
+    )
+
+
+def _in_hindsight(candidate: Candidate, fit: Fit) -> Candidate:
+    """A candidate, chosen only if it is still part of the answer."""
+    return replace(candidate, chosen=candidate.chosen and set(candidate.name.split(" + ")) <= set(fit.effects))
+
+
+def _effects(
+    inquiry: Inquiry,
+    selection: Selection,
+    rest: Rest,
+    repeated: Transfer,
+    ends: tuple[Estimate, ...],
+    shapes: list[Shape],
+) -> tuple[FoundEffect, ...]:
+    fit = rest.fit
+    reduced = {effect: inquiry.reduced(selection, fit, effect) for effect in fit.effects}
+    gains = {effect: max(selection.evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
+    total = sum(gains.values()) or 1.0
+    found = []
+    for effect in sorted(fit.effects, key=lambda e: -gains[e]):
+        law = effect_of(effect, inquiry.log.plant)
+        rivals, probability = _rivals(inquiry, selection, fit, effect)
+        found.append(
+            FoundEffect(
+                effect,
+                law.law,
+                law.source,
+                law.beyond,
+                tuple(e for e in ends if e.name.startswith(f"{effect}.")),
+                tuple(rival.name for rival in rivals if rival.separation < ALIKE),
+                rivals,
+                gains[effect],
+                inquiry.heldout_gain(repeated, reduced[effect]),
+                probability,
+                gains[effect] / total,
+                law_curve(inquiry.by_row, _taken_out(inquiry, fit, effect), fit, effect, shapes),
+            )
+        )
+    return tuple(found)
+
+
+def _taken_out(inquiry: Inquiry, fit: Fit, effect: str) -> Fit:
+    """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
+    rest = tuple(e for e in fit.effects if e != effect)
+    hypothesis = Hypothesis.of(inquiry.setting_of(fit), rest, fit.hypothesis.values)
+    found = inquiry.by_row.fit(hypothesis, inquiry.fitter.seen_by_row(fit)[1].levels, steps=0)
+    return replace(found, jacobian=found.jacobian[:, :0])
+
+
+def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
+    """Effects that could stand in the place of one, the closest first, and the probability of its name."""
+    overstated = inflation(fit, fit.hypothesis.parameters_of(effect))
+    rivals, weights = [], []
+    rest = set(fit.effects) - {effect}
+    base = inquiry.reduced(selection, fit, effect)
+    for other in selection.replacements(fit, effect):
+        name = next(iter(set(other.effects) - rest), effect)
+        if name == effect or _is_richer(other, name, effect, inquiry.log):
+            continue
+        starts = _starts(inquiry, fit, other, effect, name)
+        start = inquiry.fitter.likeliest(starts, fit.levels, 1)[0]
+        close = selection.evidence(other, fit) < max(
+            inquiry.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
+        )
+        if close or start is not starts[0]:
+            again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
+            other = max(other, again, key=lambda found: found.log_likelihood)
+        loss = selection.evidence(base, fit) - selection.evidence(base, other)
+        values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
+        rivals.append(Alternative(name, inquiry.fitter.separation(fit, other, loss, overstated), values))
+        weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
+    rivals.sort(key=lambda rival: rival.separation)
+    return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
+
+
+def _starts(inquiry: Inquiry, fit: Fit, rival: Fit, effect: str, name: str) -> list[Hypothesis]:
+    """A rival as found; with the answer's values of what they share; with the value of the effect it replaces too.
+
+    The last is the best for two effects of one equation: a bias of the angle, a centre of mass beside the axis.
+    """
+    own = rival.hypothesis.values
+    shared = {**own, **fit.hypothesis.values}
+    values = [own, shared]
+    mine = [p for p in rival.hypothesis.space.free if p.name.startswith(f"{name}.")]
+    theirs = [p for p in fit.hypothesis.space.free if p.name.startswith(f"{effect}.")]
+    if len(mine) == len(theirs) == 1 and mine[0].unit == theirs[0].unit:
+        values.append({**shared, mine[0].name: shared[theirs[0].name]})
+    return [Hypothesis.of(inquiry.setting_of(fit), rival.effects, each) for each in values]
+
+
+def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
+    """Whether a rival is the same law with more to it that is not needed."""
+    contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
+    replaced = simpler(other, log)
+    return contained == effect or (replaced is not None and effect in replaced)
+
+
+def _unexplained(inquiry: Inquiry, rest: Rest) -> Unexplained:
+    laws = {name: effect_of(name, inquiry.log.plant) for name in rest.fit.effects}
+    beyond = [name for name, law in laws.items() if law.beyond and not inquiry.fitter.looks_for(name, law)]
+    if rest.significant and beyond:
+        words = " and ".join(effect_in_words(name, inquiry.log.plant.kind) for name in beyond)
+        return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
+    if not rest.significant or rest.strongest is None:
+        return Unexplained(False, rest.p_value, None, "", (), None)
+    shape = rest.strongest.shape
+    site = inquiry.log.plant.joints[shape.joint]
+    words = {
+        "force": f"a force over {shape.signal} on {site}",
+        "gain": "an actuator gain that drifts over time",
+        "friction": f"dry friction on {site} that changes with {shape.signal}",
+        "resonance": f"something that swings with {site} at about {shape.signal} Hz",
+    }[shape.kind]
+    curve = curve_of(shape, rest.fit, rest.spread, inquiry.log) if len(rest.spread) else None
+    return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
+
+
+def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
+    found = []
+    for effect in effects:
+        for p in effect.parameters:
+            if is_wide(p):
+                found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
+        for name in effect.equivalent:
+            found.append(f"{effect.name} cannot be told from {name}")
+        if effect.heldout_gain < 0.0:
+            found.append(f"{effect.name}: fitted to all recordings but one, it does not predict that one better")
+    return tuple(found)
+
+
+def _as_one(laws: tuple[Combined, ...], plant_kind: str) -> tuple[str, ...]:
+    found = []
+    for law in laws:
+        sizes = ", ".join(f"{symbol} = {value:.3g}" for symbol, value in law.parameters.items())
+        words = f"{effect_in_words(law.name, plant_kind)} ({sizes}), which the vocabulary lacks"
+        found.append(f"{' and '.join(law.instead_of)} together cannot be told from {words}")
+    return tuple(found)
+
+
+def _units(inquiry: Inquiry) -> dict[str, str]:
+    plant = inquiry.log.plant
+    return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
+
+
+def proposed(
+    inquiry: Inquiry,
+    selection: Selection,
+    fit: Fit,
+    answer: Diagnosis,
+    feedback: tuple[StateFeedback, float] | None,
+    rng: np.random.Generator,
+) -> NextExperiment | None:
+    """The experiment that settles what is tied or weak; None where nothing is."""
+    tied = [(effect.name, name) for effect in answer.effects for name in effect.equivalent]
+    rivals = [
+        other
+        for effect, name in tied
+        for other in selection.replacements(fit, effect)
+        if name in other.effects and effect not in other.effects
+    ]
+    weak = tuple(p.name for effect in answer.effects for p in effect.parameters if is_wide(p))
+    if not rivals and not weak:
+        return None
+    questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
+    seen = tuple(inquiry.fitter.seen_by_row(rival)[1] for rival in rivals)
+    question = Question(f"Open: {', '.join(questions)}.", seen, weak)
+    closed, rate = feedback if feedback is not None else (None, inquiry.recordings[0].rate)
+    simulator = inquiry.by_row.simulator
+    answered_by_row = inquiry.fitter.seen_by_row(fit)[1]
+    return next_experiment(question, answered_by_row, inquiry.setting, inquiry.log, simulator, closed, rate, rng)

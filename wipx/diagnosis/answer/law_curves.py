@@ -1,0 +1,80 @@
+"""The law of an effect as a curve over one signal, and the force that the recordings themselves ask for."""
+
+import numpy as np
+
+from wipx.core.diagnosis import Curve
+from wipx.core.effect import Steady
+from wipx.core.model import Model
+from wipx.core.words import effect_in_words
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.residuals.discrepancy import process_mean
+from wipx.diagnosis.residuals.residual_tests import Shape, leftovers
+from wipx.effects.catalogue import effect_of
+
+POINTS = 201
+DRIVE = ("offset", "dead_zone", "gain", "saturation")  # in the order in which they act, contract section 3
+
+
+def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
+    """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
+    plant = fitter.log.plant
+    steady = effect_of(effect, plant).steady
+    if steady is None:
+        return None
+    site = effect.partition("/")[0]
+    joint = plant.joints.index(site if site in plant.joints else plant.actuated[0])
+    signal = _signal(steady, joint, fitter)
+    shape = next((s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (joint, signal)), None)
+    if shape is None:
+        return None
+    at = np.unique(np.concatenate([np.linspace(shape.knots[0], shape.knots[-1], POINTS), [-1e-9, 1e-9]]))
+    left = leftovers(fitter, reduced, [shape])[0]
+    force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
+    return Curve(
+        effect_in_words(effect, plant.kind),
+        shape.signal,
+        plant.unit_of(shape.signal),
+        "N m" if plant.is_angular(plant.joints[joint]) else "N",
+        at,
+        added_force(completed.hypothesis.model, effect, at),
+        shape.knots,
+        force,
+        spread,
+    )
+
+
+def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
+    plant = fitter.log.plant
+    if steady.over == "rate":
+        return plant.rates[joint]
+    if steady.over == "coordinate":
+        return plant.coordinates[joint]
+    return plant.commands[0 if len(plant.commands) == 1 else joint]
+
+
+def added_force(model: Model, effect: str, at: np.ndarray) -> np.ndarray:
+    """Force that an effect of a model adds in steady motion [N or N m].
+
+    Args:
+        model: With the effect.
+        effect: One that has a curve.
+        at: Rates, coordinates or commands, shape (N,), in the units of the recordings.
+    """
+    steady = effect_of(effect, model.plant).steady
+    assert steady is not None
+    if steady.over != "command":
+        return steady.force(at, model.effects[effect], model.parameters)
+    without = {name: values for name, values in model.effects.items() if name != effect}
+    return _driven(model, at) - _driven(Model(model.plant, model.parameters, without), at)
+
+
+def _driven(model: Model, command: np.ndarray) -> np.ndarray:
+    """Force of the drive at constant commands, shape (N,) [N or N m]."""
+    force = command * model.parameters["input_gain"]
+    for name in (f"actuator/{kind}" for kind in DRIVE):
+        if name in model.effects:
+            steady = effect_of(name, model.plant).steady
+            assert steady is not None
+            force = force + steady.force(force, model.effects[name], model.parameters)
+    return force

@@ -1,0 +1,161 @@
+"""Where the mismatch is: shares of sites, intervals of signals and of time, maps over the state.
+
+Measured by how much likelier every row becomes by the completed model, seen by the observer of the
+nominal one: that one trusts the recordings most, so that an excess stays where it arises.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wipx.core.diagnosis import ErrorMap, FoundEffect, Location, Period, Region
+from wipx.core.model import ModelBatch
+from wipx.core.plant import Plant
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.force_response import motion_of
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.recording_batch import Log
+
+BINS = 24  # of a map, along each axis
+RUN_BINS = 40  # along each recording
+CONCENTRATED = 0.6  # share of the excess from which an interval is told
+FEW_ROWS = 0.3  # share of the rows up to which it is one
+
+
+def excess_of(fitter: InnovationFitter, nominal: Fit, completed: Fit) -> np.ndarray:
+    """By how many nats every row becomes likelier, shape (K + 1, R); zero where rows do not count."""
+    white = fitter.white_of(nominal, ModelBatch(completed.hypothesis.model))[0].reshape(nominal.white.shape)
+    return 0.5 * np.sum(nominal.white**2 - white**2, axis=1).T
+
+
+def located(
+    fitter: InnovationFitter, nominal: Fit, completed: Fit, effects: tuple[FoundEffect, ...], rest: str | None
+) -> Location:
+    """Where the mismatch between nominal and completed model is.
+
+    Args:
+        fitter: Of both.
+        nominal: Before.
+        completed: After.
+        effects: What was found, with shares.
+        rest: Site of what is left unexplained; None where nothing is.
+    """
+    if not effects and rest is None:
+        return Location({}, (), (), None)
+    excess = excess_of(fitter, nominal, completed)
+    log = fitter.log
+    signals = motion_of(fitter, nominal)
+    regions = _named_regions(effects, signals, excess, log) or _found_regions(signals, excess, log)
+    return Location(_sites(effects, rest), regions, _periods(effects, excess, log), _map(log, signals, excess))
+
+
+def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, float]:
+    sites: dict[str, float] = {}
+    for effect in effects:
+        site = effect.name.partition("/")[0]
+        sites[site] = sites.get(site, 0.0) + effect.share
+    if rest is not None and not sites:
+        sites[rest] = 1.0
+    total = sum(sites.values())
+    return {site: float(share / total) for site, share in sorted(sites.items(), key=lambda item: -item[1])}
+
+
+def _named_regions(
+    effects: tuple[FoundEffect, ...], signals: Mapping[str, np.ndarray], excess: np.ndarray, log: Log
+) -> tuple[Region, ...]:
+    """The stretch of the rail of a sticky spot."""
+    regions = []
+    for effect in effects:
+        if effect.name.endswith("/sticky_spot"):
+            low, high = (p.value for p in effect.parameters if p.name.endswith((".lo", ".hi")))
+            inside = (signals["x"] >= low) & (signals["x"] <= high)
+            regions.append(Region("x", low, high, _share(excess, inside, log)))
+    return tuple(regions)
+
+
+def _periods(effects: tuple[FoundEffect, ...], excess: np.ndarray, log: Log) -> tuple[Period, ...]:
+    """From the payload's coming to the end of each recording."""
+    periods = []
+    for effect in effects:
+        if effect.name.endswith("/payload_event"):
+            begin = next(p.value for p in effect.parameters if p.name.endswith(".t0"))
+            for r, recording in enumerate(log.recordings):
+                end = float(recording.t[-1])
+                column = np.zeros_like(log.rows)
+                column[:, r] = log.inputs.t[:, r] >= begin
+                only = np.where(np.arange(excess.shape[1]) == r, excess, 0.0)
+                if begin < end:
+                    periods.append(Period(recording.name, begin, end, _share(only, column, log)))
+    return tuple(periods)
+
+
+def _share(excess: np.ndarray, inside: np.ndarray, log: Log) -> float:
+    total = float(excess[log.counted].sum())
+    return float(np.clip(excess[log.counted & inside].sum() / total, 0.0, 1.0)) if total > 0.0 else 0.0
+
+
+def _found_regions(signals: Mapping[str, np.ndarray], excess: np.ndarray, log: Log) -> tuple[Region, ...]:
+    """The interval of a signal that holds most of the excess in few rows, if one does."""
+    best: tuple[float, Region] | None = None
+    for name, values in signals.items():
+        if name == "t":
+            continue
+        found = _interval(name, values[log.counted], excess[log.counted])
+        if found is not None and (best is None or found[0] > best[0]):
+            best = found
+    return () if best is None else (best[1],)
+
+
+def _interval(name: str, values: np.ndarray, excess: np.ndarray) -> tuple[float, Region] | None:
+    total = float(excess.sum())
+    if total <= 0.0:
+        return None
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, 41)))
+    if len(edges) < 2:
+        return None
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    held = np.bincount(place, weights=excess, minlength=len(edges) - 1) / total
+    rows = np.bincount(place, minlength=len(edges) - 1) / len(values)
+    held, rows = (np.concatenate([[0.0], np.cumsum(part)]) for part in (held, rows))
+    best: tuple[float, Region] | None = None
+    for i in range(len(edges) - 1):
+        for j in range(i + 1, len(edges)):
+            share, few = held[j] - held[i], rows[j] - rows[i]
+            if share >= CONCENTRATED and few <= FEW_ROWS and (best is None or share - few > best[0]):
+                best = (share - few, Region(name, float(edges[i]), float(edges[j]), float(min(share, 1.0))))
+    return best
+
+
+def _map(log: Log, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> ErrorMap:
+    plant = log.plant
+    names = _axes(plant)
+    counted = log.counted
+    values = [signals[name][counted] for name in names]
+    ends = [np.quantile(v, (0.002, 0.998)) for v in values]
+    edges = [np.linspace(low, high, BINS + 1) for low, high in ends]
+    sums = np.histogram2d(*values, bins=edges, weights=excess[counted])[0]
+    counts = np.histogram2d(*values, bins=edges)[0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(counts > 0, sums / counts, np.nan)
+    times, along = [], []
+    for r in range(len(log.recordings)):
+        t = log.inputs.t[counted[:, r], r]
+        bounds = np.linspace(t[0], t[-1] + 1e-9, RUN_BINS + 1)
+        total = np.histogram(t, bounds, weights=excess[counted[:, r], r])[0]
+        times.append(0.5 * (bounds[1:] + bounds[:-1]))
+        along.append(total / np.maximum(np.histogram(t, bounds)[0], 1))
+    return ErrorMap(
+        names,
+        (plant.unit_of(names[0]), plant.unit_of(names[1])),
+        (edges[0], edges[1]),
+        mean,
+        tuple(r.name for r in log.recordings),
+        tuple(times),
+        tuple(along),
+    )
+
+
+def _axes(plant: Plant) -> tuple[str, str]:
+    """The driven joint's coordinate and rate."""
+    joint = plant.joints.index(plant.actuated[0])
+    return plant.coordinates[joint], plant.rates[joint]

@@ -1,0 +1,1 @@
+"""What could be missing: every effect screened, with first guesses of its numbers."""

@@ -1,0 +1,81 @@
+"""How much a drive gives at most: first guesses for saturation and for a torque-speed limit.
+
+What a limit takes away is no more proportional to it than where it sets in. The linear response to the force that is
+missing under each of many limits is enough to compare them all; the screening then simulates the best ones.
+"""
+
+import numpy as np
+
+from wipx.diagnosis.candidates.position_scan import left_of
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.force_response import FAST, motion_of, response
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+
+GUESSES = 6
+TOGETHER = 24  # limits whose responses are kept at once; bounds the memory
+LIMITS = np.geomspace(0.05, 1.5, 36)  # of the largest command
+SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of the largest speed
+ALIKE = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
+
+
+def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+    """Likely largest forces [N or N m], best first, shape (up to GUESSES, 1).
+
+    Args:
+        fitter: Of the fit.
+        fit: What is already explained.
+        basis: What its numbers can imitate, orthonormal, shape (N, D).
+    """
+    return _likely(fitter, fit, basis, np.array([np.inf]))[:, :1]
+
+
+def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+    """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES, 2).
+
+    Args:
+        fitter: Of the fit.
+        fit: What is already explained.
+        basis: What its numbers can imitate, orthonormal, shape (N, D).
+    """
+    return _likely(fitter, fit, basis, SPEEDS)
+
+
+def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    log = fitter.log
+    plant = log.plant
+    motion = motion_of(fitter, fit)
+    joints = [plant.joints.index(site) for site in plant.actuated]
+    model = fit.hypothesis.model
+    gain = model.parameters["input_gain"] * model.effects.get("actuator/gain", {}).get("k", 1.0)
+    forces = [np.where(log.rows, gain * motion[command], 0.0) for command in plant.commands]
+    rates = [motion[plant.rates[joint]] for joint in joints]
+    largest = max(float(np.abs(force).max()) for force in forces)
+    fastest = max(1e-9, *(float(np.quantile(np.abs(rate[log.counted]), FAST)) for rate in rates))
+    pairs = np.array([(limit * largest, speed * fastest) for speed in speeds for limit in LIMITS])
+    left = left_of(fit, basis)
+    gains = np.zeros(len(pairs))
+    for begin in range(0, len(pairs), TOGETHER):
+        stall, free = pairs[begin : begin + TOGETHER, :, None, None].swapaxes(0, 1)
+        change = sum(
+            response(fitter, fit, joint, limited(force, rate, stall, free) - force)
+            for joint, force, rate in zip(joints, forces, rates, strict=True)
+        )
+        change = change - basis @ (basis.T @ change)
+        gains[begin : begin + TOGETHER] = -(left @ change) - 0.5 * np.sum(change**2, axis=0)
+    best: list[int] = []
+    for i in np.argsort(-gains):
+        if gains[i] > 0.0 and all(_differ(pairs[i], pairs[j]) for j in best):
+            best.append(int(i))
+    return pairs[best[:GUESSES]]
+
+
+def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """What is left of a force: driving, up to a line from `stall` to none at `free`; braking, up to `stall`."""
+    driving = force * rate > 0.0
+    size = stall * np.where(driving, np.maximum(1.0 - np.abs(rate) / free, 0.0), 1.0)
+    return np.clip(force, -size, size)
+
+
+def _differ(one: np.ndarray, other: np.ndarray) -> bool:
+    stalls = max(one[0], other[0]) / min(one[0], other[0])
+    return bool(stalls > ALIKE or one[1] != other[1])

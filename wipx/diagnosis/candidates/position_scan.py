@@ -1,0 +1,98 @@
+"""Where on its way a joint meets a force: first guesses for torque ripple and for a sticky spot.
+
+Both laws fit somewhat at many places, so their likelihood has many peaks. The linear response to the force at each
+place is enough to compare them all; the screening then simulates the best ones.
+"""
+
+import numpy as np
+
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.force_response import direction, motion_of, response
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+
+PEAKS = 6  # guesses
+TOGETHER = 12  # frequencies whose responses are kept at once; bounds the memory
+FREQUENCIES = 60  # that are looked at
+TURNED = 1.5  # [rad] of phase over the whole way, by which neighbouring frequencies differ
+APART = 2  # frequencies nearer to a peak belong to it
+BINS = 40  # pieces of the way
+ALIKE = 0.7  # share that two spots have in common, from which they count as one
+RIDGE = 1e-9
+
+
+def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+    """Amplitude [N or N m], periods per radian and phase of likely torque ripple, best first, shape (PEAKS, 3).
+
+    Args:
+        fitter: Of the fit.
+        fit: What is already explained.
+        basis: What its numbers can imitate, orthonormal, shape (N, D).
+    """
+    plant = fitter.log.plant
+    rows = fitter.log.rows
+    motion = motion_of(fitter, fit)
+    radius = fit.hypothesis.model.parameters["wheel_radius"] if "wheel_radius" in plant.parameters else 1.0
+    joints = [plant.joints.index(site) for site in plant.actuated]
+    angles = [motion[plant.coordinates[joint]] / radius for joint in joints]
+    way = max(float(np.ptp(angle[rows])) for angle in angles)
+    numbers = max(1.0, TURNED / max(way, 1e-9)) * np.arange(1, FREQUENCIES + 1)
+    left = left_of(fit, basis)
+    found = []
+    for begin in range(0, FREQUENCIES, TOGETHER):
+        part = numbers[begin : begin + TOGETHER, None, None]
+        waves = [np.concatenate([np.cos(part * angle), np.sin(part * angle)]) for angle in angles]
+        slopes = sum(response(fitter, fit, j, wave) for j, wave in zip(joints, waves, strict=True))
+        slopes = slopes - basis @ (basis.T @ slopes)
+        for i in range(part.size):
+            pair = slopes[:, [i, i + part.size]]
+            force = -np.linalg.solve(pair.T @ pair + RIDGE * np.eye(2), pair.T @ left)
+            found.append((-0.5 * float(left @ (pair @ force)), np.hypot(*force), np.arctan2(-force[1], force[0])))
+    gains, amplitudes, phases = np.array(found).T
+    best: list[int] = []
+    for i in np.argsort(-gains):
+        if all(abs(i - other) >= APART for other in best):
+            best.append(int(i))
+    chosen = best[:PEAKS]
+    return np.column_stack([amplitudes[chosen], numbers[chosen], phases[chosen]])
+
+
+def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+    """Level [N], begin and end [m] of likely sticky spots of the first joint, best first, shape (up to PEAKS, 3).
+
+    Args:
+        fitter: Of the fit.
+        fit: What is already explained.
+        basis: What its numbers can imitate, orthonormal, shape (N, D).
+    """
+    log = fitter.log
+    motion = motion_of(fitter, fit)
+    x, rate = motion[log.plant.coordinates[0]], motion[log.plant.rates[0]]
+    edges = np.linspace(x[log.rows].min(), x[log.rows].max(), BINS + 1)
+    inside = (x >= edges[:-1, None, None]) & (x < edges[1:, None, None]) & log.rows
+    slopes = response(fitter, fit, 0, np.where(inside, -direction(rate, log.rows), 0.0))
+    slopes = slopes - basis @ (basis.T @ slopes)
+    # A spot is some bins in a row: sums over it are differences of sums from the beginning.
+    score = np.concatenate([[0.0], np.cumsum(slopes.T @ left_of(fit, basis))])
+    normal = np.zeros((BINS + 1, BINS + 1))
+    normal[1:, 1:] = np.cumsum(np.cumsum(slopes.T @ slopes, axis=0), axis=1)
+    low, high = np.triu_indices(BINS + 1, 1)
+    total = normal[high, high] - normal[low, high] - normal[high, low] + normal[low, low]
+    level = -(score[high] - score[low]) / np.maximum(total, RIDGE)
+    gains = np.where(level > 0.0, 0.5 * level**2 * total, 0.0)
+    best: list[int] = []
+    for i in np.argsort(-gains):
+        if gains[i] > 0.0 and all(_common(low[[i, j]], high[[i, j]]) < ALIKE for j in best):
+            best.append(int(i))
+    chosen = best[:PEAKS]
+    return np.column_stack([level[chosen], edges[low[chosen]], edges[high[chosen]]])
+
+
+def left_of(fit: Fit, basis: np.ndarray) -> np.ndarray:
+    """White innovations, freed of what a basis imitates."""
+    white = fit.white.ravel()
+    return white - basis @ (basis.T @ white)
+
+
+def _common(low: np.ndarray, high: np.ndarray) -> float:
+    """Share of the whole that two spots have in common, from their begins and ends."""
+    return (high.min() - low.max()) / (high.max() - low.min())

@@ -1,0 +1,157 @@
+"""Screening: what every effect of the vocabulary would explain, estimated with one simulation each.
+
+A score test (Rao 1948): the change that a small dose of an effect makes in the white innovations,
+freed of what the numbers already in the model can imitate, is compared with the innovations themselves.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from wipx.core.effect import Effect
+from wipx.core.model import ModelBatch
+from wipx.core.parameters import Scales
+from wipx.diagnosis.candidates.backlash_scan import plays
+from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
+from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.hypothesis import Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.effects.catalogue import vocabulary
+
+FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
+FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
+CHUNK = 24  # models simulated at once; bounds the memory
+
+Scan = Callable[[InnovationFitter, Fit, np.ndarray], np.ndarray]
+
+SCANS: dict[str, Scan] = {
+    "ripple": ripples,
+    "sticky_spot": sticky_spots,
+    "saturation": saturations,
+    "speed_limit": speed_limits,
+    "backlash": plays,
+}  # first guesses that take more than a grid
+AS_THEY_ARE = ("backlash",)  # guesses that no dose makes better: what a gap does is not proportional to it
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """An effect that may be missing.
+
+    Attributes:
+        effect: Its name.
+        gain: What adding it is expected to gain, in nats.
+        values: Where a fit should start, by "site/kind.symbol" [SI].
+        estimate: Its first number, were the effect proportional to it [SI].
+        deviation: Standard deviation of that; infinite where the effect has a threshold.
+    """
+
+    effect: str
+    gain: float
+    values: Mapping[str, float]
+    estimate: float
+    deviation: float
+
+
+def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = False) -> list[Prospect]:
+    """Where to start for every effect that could be added to a fit, best first.
+
+    Args:
+        fitter: Fits and simulates.
+        setting: The robot.
+        fit: What is already explained.
+        beyond: Whether to look at the effects that contract section 3 lacks instead of those it has.
+    """
+    known = vocabulary(setting.nominal.plant)
+    present = set(fit.hypothesis.model.effects)
+    found: list[Prospect] = []
+    for name, effect in known.items():
+        wanted = effect.beyond if beyond else fitter.looks_for(name, effect)
+        if wanted and not _excluded(name, effect, present, known):
+            found += prospects_of_effect(fitter, setting, fit, name)
+    return sorted(found, key=lambda prospect: -prospect.gain)
+
+
+def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, Effect]) -> bool:
+    site = name.partition("/")[0]
+    others = {f"{site}/{kind}" for kind in effect.excludes}
+    excluding = {
+        p for p in present if f"{p.partition('/')[0]}/{effect.kind}" == name and effect.kind in known[p].excludes
+    }
+    return name in present or bool(others & present) or bool(excluding)
+
+
+def doses(effect: Effect, scales: Scales) -> np.ndarray:
+    """Values of an effect's parameters at which it is looked for, shape (atoms, parameters) [SI]."""
+    axes = [[g * scales.of(p.dimension) for g in (p.grid or (p.start,))] for p in effect.parameters]
+    return np.array(list(product(*axes)))
+
+
+def undosed(setting: Setting, name: str) -> list[dict[str, float]]:
+    """The doses of an effect as they are, where screening scales all of its numbers; none where it scales not all.
+
+    What an effect does is not always proportional to it: a late sensor also asks for another observer.
+    """
+    effect = vocabulary(setting.nominal.plant)[name]
+    if len(effect.linear_in) < len(effect.parameters):
+        return []
+    names = [f"{name}.{p.name}" for p in effect.parameters]
+    atoms = doses(effect, setting.scales[name.partition("/")[0]]).tolist()
+    return [dict(zip(names, atom, strict=True)) for atom in atoms]
+
+
+def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> list[Prospect]:
+    """Where to start for one effect that could be added to a fit."""
+    effect = vocabulary(setting.nominal.plant)[name]
+    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+    model = fit.hypothesis.model.with_effects({name: effect.neutral})
+    fit = replace(fit, levels=fitter.spread_for(model, fit.levels))
+    base = fit.white.ravel()
+    basis = basis_of(fit)
+    left = base - basis @ (basis.T @ base)
+    scan = SCANS.get(effect.kind)
+    atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
+    grown = np.array([p.name in effect.linear_in for p in effect.parameters])
+    neutral = np.array([p.neutral for p in effect.parameters])
+    low, high = _bounds(setting, name, effect)
+    found = []
+    for begin in range(0, len(atoms), CHUNK):
+        part = atoms[begin : begin + CHUNK]
+        change = fitter.white_of(fit, ModelBatch(model, names, part)) - base
+        change -= (change @ basis) @ basis.T
+        slope, size = change @ left, np.sum(change**2, axis=1)
+        for i, atom in enumerate(part):
+            best = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
+            dose = best if grown.any() and effect.kind not in AS_THEY_ARE else 1.0
+            values = np.where(grown, neutral + dose * (atom - neutral), atom)
+            if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
+                continue
+            gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
+            estimate = neutral[0] + best * (atom[0] - neutral[0])
+            deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
+            start = dict(zip(names, values.tolist(), strict=True))
+            found.append(Prospect(name, float(gain), start, float(estimate), float(deviation)))
+    return found
+
+
+def _scanned(scan: Scan, fitter: Fitter, fit: Fit) -> np.ndarray:
+    """First guesses of an effect from how innovations answer to forces at single rows."""
+    by_row, seen = fitter.sketched_by_row(fit)
+    return scan(by_row, seen, basis_of(seen))
+
+
+def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np.ndarray]:
+    scales = setting.scales[name.partition("/")[0]]
+    sizes = np.array([scales.of(p.dimension) for p in effect.parameters])
+    return np.array([p.low for p in effect.parameters]) * sizes, np.array([p.high for p in effect.parameters]) * sizes
+
+
+def basis_of(fit: Fit) -> np.ndarray:
+    """What small changes of a fit's free numbers make of its white innovations, orthonormal, shape (R m (K + 1), D)."""
+    jacobian = fit.jacobian[: fit.white.size, fit.free]
+    if not jacobian.shape[1]:
+        return np.zeros((len(jacobian), 0))
+    return np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0]

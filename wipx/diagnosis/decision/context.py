@@ -1,0 +1,153 @@
+"""What all stages of a diagnosis share: the recordings, what fits models to them, and what judges predictions."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.recording import Recording
+from wipx.core.results import FitErrors
+from wipx.diagnosis.decision.held_out import Transfer, transfer
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.observer import NoiseLevels
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.selection.search import Selection
+from wipx.identify.evaluation import RIGHT, Judge
+from wipx.identify.noise import sensor_noise
+from wipx.sim.analytic import AnalyticSimulator
+
+HORIZON = 0.5  # [s] of predictions, contract section 4
+FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
+FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's predictions
+# Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In
+# half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
+QUIET = 5e-4
+# Ratio of errors from states that trust a model to those from the best states, beyond which it is wrong: of 24 exact
+# robots one is at 1.51, the others below 1.4.
+DISTRUSTED = 1.5
+TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """The means of one diagnosis.
+
+    Attributes:
+        fitter: Fits hypotheses to the recordings, by the evidence that is counted.
+        by_row: Fits them by innovations.
+        setting: The robot, as its owner believes it to be.
+        first_levels: A first guess of the noise.
+        judge: Predicts recordings.
+        recordings: Of the robot.
+    """
+
+    fitter: Fitter
+    by_row: InnovationFitter
+    setting: Setting
+    first_levels: NoiseLevels
+    judge: Judge
+    recordings: tuple[Recording, ...]
+
+    @classmethod
+    def of(cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator) -> "Inquiry":
+        """The means for recordings of a robot."""
+        plant = setting.nominal.plant
+        log = Log.of(recordings, plant)
+        noise = sensor_noise(recordings, plant)
+        rates = [_rate_noise(recordings, plant.rates[c - log.joints]) for c in log.channels if c >= log.joints]
+        levels = NoiseLevels(np.full(log.joints, 0.01), np.array([*noise, *rates]))
+        fitter = InnovationFitter(Follower.of(simulator, log, setting.nominal))
+        return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
+
+    def trusting(self, fit: Fit) -> "Inquiry":
+        """The same; all models predict from states of the filter from which that of a fit predicts best."""
+        tuned = self.judge.tuned(fit.hypothesis.model, self.recordings)
+        return replace(self, judge=replace(self.judge, bandwidths=tuned.bandwidths))
+
+    def is_trusted(self, fit: Fit) -> bool:
+        """Whether the laws of a fit hold, and not only nearly.
+
+        Row by row they ask for no forces but theirs: what a law misses, an observer takes for noise of the forces. And
+        the fit predicts like a right model: at the floor, or well from states estimated with trust in it. A sensor's
+        noise that lasts makes errors larger than the floor, which knows of white noise only; but a right model then
+        predicts about as well from a filter that trusts it as from any other.
+        """
+        if not self.is_quiet(fit):
+            return False
+        errors = self.errors(fit)
+        if errors.times_the_floor <= FAR_FROM_THE_FLOOR:
+            return True
+        trusting = dict.fromkeys(self.log.plant.coordinates, RIGHT)
+        judge = replace(self.judge, bandwidths=trusting)
+        others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
+        return all(others[name] <= DISTRUSTED * error for name, error in errors.completed.items())
+
+    def is_quiet(self, fit: Fit) -> bool:
+        """Whether a fit asks for no forces but those of its laws, row by row."""
+        levels = self.fitter.seen_by_row(fit)[1].levels
+        usual = np.array([self.setting.scales[site].force for site in self.log.plant.joints])
+        return bool(np.all(levels.force <= QUIET * usual))
+
+    def errors(self, fit: Fit) -> FitErrors:
+        """Errors of the nominal model and of a fit on the recordings."""
+        return self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
+
+    @property
+    def log(self) -> Log:
+        """The recordings."""
+        return self.fitter.log
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether any command ever changes."""
+        return bool(np.ptp(self.log.inputs.commands, axis=0).max() > 0.0)
+
+    def transfers(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
+        return self.heldout_gain(transfer(self.fitter, larger), smaller) > -TOLERATED
+
+    def heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
+        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
+        before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings))
+        return 1.0 - self.heldout_error(repeated) / before if before > 0.0 else 0.0
+
+    def heldout_error(self, repeated: Transfer) -> float:
+        """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
+        folds = zip(repeated.models, self.recordings, strict=True)
+        return self._squared_error([self.judge.predict(model, (recording,))[0] for model, recording in folds])
+
+    def reduced(self, selection: Selection, fit: Fit, *gone: str) -> Fit:
+        """The fit without some of its effects, its stand-in kept."""
+        rest = tuple(e for e in fit.effects if e not in gone)
+        setting = self.setting_of(fit)
+        if setting is self.setting:
+            return selection.fitted(rest, fit) if rest else selection.nominal
+        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
+        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+
+    def setting_of(self, fit: Fit) -> Setting:
+        """The robot, with the stand-in of a fit where it has one."""
+        model = fit.hypothesis.space.model
+        extra = {
+            name: values
+            for name, values in model.effects.items()
+            if name not in fit.effects and name not in self.setting.nominal.effects
+        }
+        if not extra:
+            return self.setting
+        return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
+
+    def _squared_error(self, predicted: list[np.ndarray]) -> float:
+        columns = self.log.plant.coordinates
+        return sum(
+            float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
+            for recording, coordinates in zip(self.recordings, predicted, strict=True)
+        )
+
+
+def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:
+    """Standard deviation of a recorded rate's noise, by second differences."""
+    values = np.concatenate([np.diff(r[column], 2) for r in recordings])
+    return max(1.4826 * float(np.median(np.abs(values))) / np.sqrt(6.0), 1e-9)

@@ -1,0 +1,145 @@
+"""Numbers of a diagnosis: estimates with 95 % intervals, and bounds of what was not found."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from wipx.core.diagnosis import Bound
+from wipx.core.model import Model, ModelBatch
+from wipx.core.plant import Plant
+from wipx.core.results import Estimate
+from wipx.diagnosis.candidates.screening import Prospect
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.nonsmooth_search import alike
+from wipx.diagnosis.likelihood.sandwich import covariance
+from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
+from wipx.effects.catalogue import effect_of
+from wipx.identify.parameter_space import ParameterSpace
+
+NINETY_FIVE = 1.96  # standard deviations
+LAW_MISFIT = 5e-4  # share of the evidence that a law may miss though it is the right one; widens intervals
+UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
+NUDGE = 0.05  # relative change of the spread, to see what it does
+WIDE = 0.3  # relative half width of an interval from which a number is called weak
+
+
+def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
+    """Every number of a fit with its 95 % interval."""
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    values = space.to_values(cube)
+    moving = scatter_of(fit, fitter.runs)
+    between = np.array([moving[i].deviation if i in moving else 0.0 for i in range(len(cube))])
+    deviation = np.hypot(deviations(fitter, fit, nominal), between)
+    as_good = alike(fitter, fit, _explained(fit, nominal))
+    low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
+    high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
+    # A number without any influence may be anything.
+    blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
+    return tuple(
+        Estimate(
+            p.name,
+            p.unit,
+            p.neutral,
+            float(values[i]) - turns,
+            (p.low if blind[i] else float(low[i])) - turns,
+            (p.high if blind[i] else float(high[i])) - turns,
+            bool(cube[i] <= 0.0 or cube[i] >= 1.0),
+            _meaning(space.model, p.name),
+            _ends(space, cube, i, moving[i]) if i in moving else None,
+        )
+        for i, p in enumerate(space.free)
+        for turns in [_whole_turns(p.name, float(values[i]))]
+    )
+
+
+def _ends(space: ParameterSpace, cube: np.ndarray, index: int, moving: Scatter) -> tuple[float, float]:
+    """Least and largest value of a number that moves from run to run."""
+    low, high = (
+        float(space.to_values(np.where(np.arange(len(cube)) == index, end, cube))[index])
+        for end in (moving.low, moving.high)
+    )
+    return low, high
+
+
+def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
+    """Standard deviations of the position in the cube, with all that is in doubt beside chance, shape (D,)."""
+    if not len(fit.hypothesis.cube):
+        return np.zeros(0)
+    # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
+    wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * _explained(fit, nominal))
+    chance = wider * np.sqrt(np.diag(covariance(fit)))
+    doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
+    return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
+
+
+def _explained(fit: Fit, nominal: Fit) -> float:
+    return max(fit.log_likelihood - nominal.log_likelihood, 0.0)
+
+
+def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:
+    """How large effects that were not found could be: from the sharpest look at each."""
+    sharpest: dict[str, tuple[float, Bound]] = {}
+    for prospect in looked_at:
+        first, value = next(iter(prospect.values)), prospect.estimate
+        if not np.isfinite(prospect.deviation):
+            continue
+        spec = effect_of(prospect.effect, plant).parameters[0]
+        unit = spec.unit(angular=plant.is_angular(prospect.effect.partition("/")[0]))
+        reach = NINETY_FIVE * prospect.deviation
+        low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
+        known = sharpest.get(prospect.effect)
+        if known is None or prospect.deviation < known[0]:
+            sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, max(value + reach, low), unit))
+    return tuple(bound for _, bound in sharpest.values())
+
+
+def is_wide(p: Estimate) -> bool:
+    """Whether the interval of a number is wide beside the number itself."""
+    return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
+
+
+def _whole_turns(name: str, value: float) -> float:
+    """The whole turns in a phase [rad]; nothing for other numbers."""
+    return 2.0 * np.pi * round(value / (2.0 * np.pi)) if name.endswith(".phase") else 0.0
+
+
+def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
+    """How far the position in the cube moves when the simulator halves its step, shape (D,).
+
+    One Gauss-Newton step: the error of the integrator, and how rough the likelihood is where joints stick and slip
+    between two steps.
+    """
+    if not len(fit.hypothesis.cube):
+        return np.zeros(0)
+    change = fitter.refined().white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
+    return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
+
+
+def doubt_of_laws(fit: Fit) -> np.ndarray:
+    """What laws leave open, in standard deviations in the cube, shape (D,)."""
+    space, plant = fit.hypothesis.space, fit.hypothesis.model.plant
+    share = np.zeros(len(space.free))
+    for effect in fit.effects:
+        law = effect_of(effect, plant)
+        share[space.names.index(f"{effect}.{law.parameters[0].name}")] = law.doubt
+    values = space.to_values(fit.hypothesis.cube)
+    return np.abs(space.to_cube((1.0 + share) * values) - fit.hypothesis.cube)
+
+
+def doubt_of_spread(fitter: Fitter, fit: Fit) -> np.ndarray:
+    """What not knowing the spread of single commands adds to the standard deviations in the cube, shape (D,)."""
+    if fit.levels.spread == 0.0 or not len(fit.hypothesis.cube):
+        return np.zeros(len(fit.hypothesis.cube))
+    wider = replace(fit, levels=replace(fit.levels, spread=(1.0 + NUDGE) * fit.levels.spread))
+    slope = (fitter.white_of(wider, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()) / NUDGE
+    jacobian = fit.jacobian[: slope.size]
+    shift = np.linalg.pinv(fit.information) @ (jacobian.T @ slope)
+    own = float(np.sum((slope - jacobian @ shift) ** 2))  # what numbers of the fit cannot imitate
+    return np.abs(shift) / np.sqrt(max(own, 1.0))
+
+
+def _meaning(model: Model, name: str) -> str:
+    effect, _, symbol = name.rpartition(".")
+    if not effect:
+        return model.plant.parameters[symbol].meaning
+    return next(p.meaning for p in effect_of(effect, model.plant).parameters if p.name == symbol)

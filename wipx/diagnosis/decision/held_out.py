@@ -1,0 +1,66 @@
+"""Does the answer transfer: every recording judged by a model that was fitted to the others."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.core.model import Model
+from wipx.core.recording import Recording
+from wipx.core.results import FitErrors, Trace
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.identify.evaluation import Judge
+
+STEPS = 3  # of refining values that are nearly right
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """A fit repeated without each recording in turn.
+
+    Attributes:
+        models: Completed model of each fold, one per recording.
+        likelihoods: Log-likelihood of each recording under its fold's model, shape (R,).
+    """
+
+    models: tuple[Model, ...]
+    likelihoods: np.ndarray
+
+
+def transfer(fitter: Fitter, fit: Fit) -> Transfer:
+    """Leave out each recording; one alone is judged by the model that was fitted to it."""
+    count = len(fitter.log.recordings)
+    cubes = [fit.hypothesis.cube] * count
+    if count > 1 and len(fit.hypothesis.cube):
+        cubes = [fitter.without(r).fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube for r in range(count)]
+    space = fit.hypothesis.space
+    batch = space.batch(np.stack(cubes))
+    white = fitter.white_of(fit, batch).reshape(count, *fit.white.shape)
+    likelihoods = np.array([fitter.by_recording(fit, each)[r] for r, each in enumerate(white)])
+    return Transfer(tuple(fit.hypothesis.at(cube).model for cube in cubes), likelihoods)
+
+
+def judged(
+    judge: Judge, nominal: Model, models: tuple[Model, ...], recordings: tuple[Recording, ...]
+) -> tuple[FitErrors, tuple[Trace, ...]]:
+    """Prediction errors and traces of each recording, by the model of its fold."""
+    if all(model == models[0] for model in models):
+        return judge.compare(nominal, models[0], recordings, held_out=True)
+    parts = [
+        judge.compare(nominal, model, (recording,), held_out=True)
+        for model, recording in zip(models, recordings, strict=True)
+    ]
+    return joined([errors for errors, _ in parts]), tuple(trace for _, traces in parts for trace in traces)
+
+
+def joined(parts: list[FitErrors]) -> FitErrors:
+    """Errors of several sets of windows together."""
+    weights = np.array([part.windows for part in parts], dtype=float)
+
+    def mean(which: str) -> dict[str, float]:
+        values = [getattr(part, which) for part in parts]
+        return {
+            name: float(np.sqrt(np.average([value[name] ** 2 for value in values], weights=weights)))
+            for name in values[0]
+        }
+
+    return FitErrors(parts[0].horizon, int(weights.sum()), mean("nominal"), mean("completed"), mean("noise_floor"))

@@ -1,0 +1,303 @@
+"""Is robot.yaml, or the reading of the log, grossly wrong: signs, units, zeros.
+
+Such a slip looks like missing physics of every kind at once. Each of the usual ones is undone in turn, and where the
+nominal model then explains the recordings far better than any single effect makes it, the owner is told instead of
+being given a diagnosis. What is uncertain by a few per cent is no slip; that is what effects are for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wipx.core.errors import InputError
+from wipx.core.model import Model
+from wipx.core.plant import Plant
+from wipx.core.recording import Recording
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.noise_model import LARGEST
+from wipx.diagnosis.likelihood.observer import NoiseLevels
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.selection.search import Selection
+from wipx.identify.evaluation import Judge
+from wipx.identify.noise import sensor_noise
+from wipx.identify.parameter_space import scales_of
+from wipx.sim.analytic import AnalyticSimulator
+
+HORIZON = 0.5  # [s] of predictions, contract section 4
+PROBE_SPAN = 3.0  # [s] of a recording; a gross error shows in every second of it
+PROBE_RECORDINGS = 4
+ROUNDS = 3  # of noise levels and values in turn
+OVERWHELMING = 0.05  # nats for every recorded value: errors from row to row 5 % smaller throughout
+QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins [s^0.5]
+GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
+RUN_AWAY = 0.01  # share of rows in which a model is nowhere near the recording
+LEAST_MOTION = 0.005  # [m, rad] that a recorded robot travels
+ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A mistake of owners, by what undoes it.
+
+    Attributes:
+        contradicted: What the recordings contradict, after "its".
+        undone: What was tried, after "with".
+        remedy: What the owner writes instead.
+        columns: Factor and offset of recorded columns, value = factor * column + offset.
+        parameters: Factor of the nominal model's numbers.
+    """
+
+    contradicted: str
+    undone: str
+    remedy: str
+    columns: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def model(self, nominal: Model) -> Model:
+        """The nominal model with its numbers put right."""
+        return nominal.with_values({name: factor * nominal.value(name) for name, factor in self.parameters.items()})
+
+    def recording(self, recording: Recording) -> Recording:
+        """A recording with its columns put right."""
+        changed = {n: f * recording[n] + offset for n, (f, offset) in self.columns.items() if n in recording}
+        return Recording(recording.name, {**recording.columns, **changed}, recording.source, recording.periods)
+
+    def factors(self, log: Log) -> np.ndarray:
+        """Size of the factor on each recorded channel, shape (m,)."""
+        names = (*log.plant.coordinates, *log.plant.rates)
+        return np.array([abs(self.columns.get(names[c], (1.0, 0.0))[0]) for c in log.channels])
+
+    def is_of_commands(self, log: Log) -> bool:
+        """Whether it leaves motion and model as they are."""
+        return not self.parameters and set(self.columns) <= set(log.plant.commands)
+
+    def leaves_motion(self, log: Log) -> bool:
+        """Whether the coordinates still move noticeably once it is put right; a unit that is right is no slip."""
+        for column, (factor, _) in self.columns.items():
+            if column in log.plant.coordinates:
+                travel = max(float(np.ptp(r[column])) for r in log.recordings)
+                if abs(factor) * travel < LEAST_MOTION:
+                    return False
+        return True
+
+
+def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
+    """Refuse a robot.yaml that the recordings contradict grossly.
+
+    The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside.
+    With commands put right the nominal model must predict half a second better, too: a late drive looks reversed from
+    row to row.
+
+    Args:
+        fitter: Of the recordings.
+        setting: The robot.
+        nominal: Fit of the nominal model.
+        best: The best fit with one effect more; `nominal` where none helps.
+        where: File that describes the robot, for the message.
+
+    Raises:
+        InputError: a sign, a unit or a zero is wrong; the message says which and how to mend it.
+    """
+    log = fitter.log
+    probe = _Case.of(fitter.simulator, _probed(log.recordings), setting, nominal.levels)
+    possible = [slip for slip in slips(setting.nominal) if slip.leaves_motion(log)]
+    mended = [(probe.without(slip), slip) for slip in possible]
+    case, slip = max(mended, key=lambda pair: pair[0].nominal_likelihood)
+    if case.nominal_likelihood <= probe.nominal_likelihood:
+        return
+    believed = max(probe.nominal_likelihood, probe.likelihood_with(best))
+    gain = (case.best_likelihood() - believed) / probe.values
+    predicts = not slip.is_of_commands(log) or case.relative_error < probe.relative_error
+    if gain > OVERWHELMING and predicts:
+        raise InputError(
+            f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from "
+            f"row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {slip.remedy}"
+        )
+
+
+def slips(nominal: Model) -> tuple[Slip, ...]:
+    """The mistakes that are possible for a robot."""
+    plant = nominal.plant
+    found = [*_signs(plant), *_units_of_columns(nominal), *_zeros(plant), *_units_of_parameters(nominal)]
+    return tuple(found)
+
+
+def _signs(plant: Plant) -> list[Slip]:
+    named = " and ".join(plant.commands)
+    mapped = ", ".join(f"{u}: {{column: {u}, scale: -1}}" for u in plant.commands)
+    reverse = {u: (-1.0, 0.0) for u in plant.commands}
+    reversed_commands = Slip(f"sign of {named}", f"{named} reversed", f"reverse it with signals: {{{mapped}}}", reverse)
+    if len(plant.joints) == 1 or plant.kind == "double_pendulum":
+        return [reversed_commands]  # a reversed coordinate is the same
+    return [reversed_commands, *(_reversed(column) for column in plant.coordinates)]
+
+
+def _reversed(column: str) -> Slip:
+    remedy = f"reverse it with signals: {{{column}: {{column: {column}, scale: -1}}}}, and its rate likewise"
+    columns = {column: (-1.0, 0.0), f"{column}_dot": (-1.0, 0.0)}
+    return Slip(f"sign of {column}", f"{column} reversed", remedy, columns)
+
+
+def _units_of_columns(nominal: Model) -> list[Slip]:
+    plant = nominal.plant
+    found = []
+    angles = [column for column in plant.coordinates if column != "x"]
+    if angles:
+        columns = {name: (np.pi / 180.0, 0.0) for a in angles for name in (a, f"{a}_dot")}
+        mapped = ", ".join(f"{a}: {{column: {a}, unit: deg}}" for a in angles)
+        found.append(
+            Slip(f"unit of {' and '.join(angles)}, rad", "degrees read", f"write signals: {{{mapped}}}", columns)
+        )
+    if "x" in plant.coordinates:
+        columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
+        found.append(Slip("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
+    radius = nominal.parameters.get("wheel_radius", 1.0)
+    if "x" in plant.coordinates and abs(np.log(radius)) > ALIKE:
+        remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
+        found.append(Slip("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
+    return found
+
+
+def _zeros(plant: Plant) -> list[Slip]:
+    column = next((column for column in plant.coordinates if column != "x"), None)
+    if column is None:
+        return []
+    zero, other = ("hanging", "upright") if plant.kind == "double_pendulum" else ("upright", "hanging")
+    remedy = f"move it with signals: {{{column}: {{column: {column}, offset: 3.14159}}}}"
+    return [Slip(f"zero of {column}, which is {zero}", f"0 taken for {other}", remedy, {column: (1.0, np.pi)})]
+
+
+def _units_of_parameters(nominal: Model) -> list[Slip]:
+    wrong = (
+        ("body_mass", 1e-3, "g", "kg"),
+        ("body_inertia", 1e-3, "g m^2", "kg m^2"),
+        ("body_inertia", 1e-4, "kg cm^2", "kg m^2"),
+        ("com_height", 1e-3, "mm", "m"),
+        ("com_height", 1e-2, "cm", "m"),
+    )
+    found = []
+    for name, factor, taken, expected in wrong:
+        if name not in nominal.parameters:
+            continue
+        value = factor * nominal.parameters[name]
+        remedy = f"write {name}: {value:.5g} if it is in {taken}"
+        slip = Slip(f"{name}, {expected}", f"{taken} read", remedy, parameters={name: factor})
+        if _is_a_body(slip.model(nominal)):
+            found.append(slip)
+    return found
+
+
+def _is_a_body(model: Model) -> bool:
+    """Whether inertia, mass and height could belong to one body; a slip leaves them decades apart."""
+    p = model.parameters
+    if "body_inertia" not in p:
+        return False
+    return GYRATION[0] < p["body_inertia"] / (p["body_mass"] * p["com_height"] ** 2) < GYRATION[1]
+
+
+def _probed(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    return tuple(r.between(r.t[0], r.t[0] + PROBE_SPAN) for r in recordings[:PROBE_RECORDINGS])
+
+
+@dataclass(frozen=True)
+class _Case:
+    """Recordings beside a description of the robot, as given or with a slip put right.
+
+    Attributes:
+        fitter: Of these recordings.
+        setting: The robot.
+        nominal: Fit of the nominal model; None where that runs away.
+        levels: Where a search for the noise begins.
+        density: Log-likelihood that is due to the units alone.
+    """
+
+    fitter: InnovationFitter
+    setting: Setting
+    nominal: Fit | None
+    levels: NoiseLevels
+    density: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        simulator: AnalyticSimulator,
+        recordings: tuple[Recording, ...],
+        setting: Setting,
+        levels: NoiseLevels,
+        density: float = 0.0,
+    ) -> "_Case":
+        log = Log.of(recordings, setting.nominal.plant)
+        fitter = InnovationFitter(Follower.of(simulator, log, setting.nominal))
+        return cls(fitter, setting, _polished(fitter, Hypothesis.of(setting, (), {}), levels), levels, density)
+
+    @property
+    def values(self) -> int:
+        """How many recorded values count."""
+        log = self.fitter.log
+        return int(log.counted.sum()) * log.signals
+
+    @property
+    def nominal_likelihood(self) -> float:
+        """Log-likelihood with the nominal model, of the recordings in the units that they were logged in."""
+        return self._likelihood(self.nominal)
+
+    @property
+    def relative_error(self) -> float:
+        """Root mean square error of the nominal model's predictions, over the spread of each coordinate."""
+        recordings, model = self.fitter.log.recordings, self.setting.nominal
+        judge = Judge(self.fitter.simulator, sensor_noise(recordings, model.plant), HORIZON)
+        errors = judge.compare(model, model, recordings, held_out=False)[0].completed
+        spread = {name: max(float(np.ptp(r[name])) for r in recordings) for name in errors}
+        return float(np.sqrt(np.mean([(error / spread[name]) ** 2 for name, error in errors.items()])))
+
+    def likelihood_with(self, other: Fit) -> float:
+        """The same with the effects of another fit."""
+        return self._likelihood(_polished(self.fitter, other.hypothesis, self.levels))
+
+    def best_likelihood(self) -> float:
+        """The same with the best single effect beside the nominal model."""
+        if self.nominal is None:
+            return -np.inf
+        try:
+            extended = Selection(self.fitter, self.setting, self.nominal).extensions(self.nominal)
+        except np.linalg.LinAlgError:
+            extended = []
+        return max(self._likelihood(fit) for fit in (self.nominal, *extended))
+
+    def without(self, slip: Slip) -> "_Case":
+        """The same recordings with a slip put right."""
+        log = self.fitter.log
+        recordings = tuple(slip.recording(r) for r in log.recordings)
+        model = slip.model(self.setting.nominal)
+        scales = scales_of(model, recordings)
+        factors = slip.factors(log)
+        force = np.array([QUIET_FORCE * scales[site].force for site in log.plant.joints])
+        levels = NoiseLevels(force, self.levels.sensor * factors)
+        density = int(log.counted.sum()) * float(np.log(factors).sum())
+        mended = Setting(model, self.setting.uncertainty, scales)
+        return _Case.of(self.fitter.simulator, recordings, mended, levels, density)
+
+    def _likelihood(self, fit: Fit | None) -> float:
+        return -np.inf if fit is None else fit.log_likelihood + self.density
+
+
+def _polished(fitter: InnovationFitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit | None:
+    """The best values and noise; None where the model runs away from the recordings."""
+    try:
+        fit = fitter.polished(fitter.fit(hypothesis, levels), rounds=ROUNDS)
+    except np.linalg.LinAlgError:
+        return None
+    return None if _runs_away(fitter, fit) or not np.isfinite(fit.log_likelihood) else fit
+
+
+def _runs_away(fitter: InnovationFitter, fit: Fit) -> bool:
+    """Whether innovations are at the bound of what is counted; the colour takes a constant for no error at all."""
+    follower, levels = fitter.follower, fit.levels
+    batch = fit.hypothesis.space.batch(fit.hypothesis.cube)
+    gains = follower.gains(levels, fit.hypothesis.model)
+    innovations = follower.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
+    return float(np.mean(np.abs(innovations) >= LARGEST)) > RUN_AWAY

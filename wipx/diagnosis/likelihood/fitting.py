@@ -1,0 +1,327 @@
+"""Maximum likelihood: the parameters with which a hypothesis explains recordings best.
+
+Prediction-error method (Ljung 1999, System Identification, ch. 7): Levenberg-Marquardt steps on white errors, with
+what makes them white held fixed. What the errors are is left to the evidence that is counted: `innovations` are those
+of predictions of one row, `forecasts` those of predictions of up to half a second.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
+
+import numpy as np
+
+from wipx.core.effect import Effect
+from wipx.core.model import Model, ModelBatch
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.sim.analytic import AnalyticSimulator
+
+if TYPE_CHECKING:
+    from wipx.diagnosis.likelihood.innovations import InnovationFitter
+
+FIRST_STEP = 1e-4  # of the search interval, for the first slopes
+LARGEST_STEP = 0.02
+SECANT = 0.3  # standard deviations over which later slopes are taken
+DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
+SETTLED = 0.05  # nats per step at which a refinement ends
+LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
+ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
+POLISHED = 0.5  # nats at which alternating ends
+
+
+class Noise(Protocol):
+    """What makes errors white."""
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the errors that it was fitted to, up to a constant that all hypotheses share."""
+        ...
+
+    @property
+    def reported(self) -> float:
+        """The part of it that is the reported forces'."""
+        ...
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A hypothesis fitted to recordings.
+
+    Attributes:
+        hypothesis: With its best values.
+        levels: What was held fixed: noise levels, or where predictions start.
+        noise: Of its errors.
+        white: Errors made white; of innovations, shape (R, m, K + 1), zero at rows that do not count.
+        blocks: Number of the stretch of time to which each white error belongs, shape of `white`.
+        rows: Number of errors that count as independent.
+        jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N + priors, D).
+        log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
+    """
+
+    hypothesis: Hypothesis
+    levels: Any
+    noise: Any
+    white: np.ndarray
+    blocks: np.ndarray
+    rows: int
+    jacobian: np.ndarray
+    log_likelihood: float
+
+    @property
+    def motion_likelihood(self) -> float:
+        """Log-likelihood without that of forces which the drives report."""
+        return self.log_likelihood - self.noise.reported
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the hypothesis."""
+        return self.hypothesis.effects
+
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """Slope of the negative log-likelihood by the position in the cube, shape (D,)."""
+        residual = np.concatenate([self.white.ravel(), self.hypothesis.space.prior_residuals(self.hypothesis.cube)[0]])
+        return self.jacobian.T @ residual
+
+    @property
+    def free(self) -> np.ndarray:
+        """Which numbers no bound keeps from better values, shape (D,)."""
+        cube = self.hypothesis.cube
+        return ~((cube <= 0.0) & (self.slope > 0.0) | (cube >= 1.0) & (self.slope < 0.0))
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """Inverse covariance of the position in the cube, shape (D, D)."""
+        return self.jacobian.T @ self.jacobian
+
+
+class Fitter(ABC):
+    """Fits hypotheses to recordings, by one kind of evidence.
+
+    Attributes:
+        considered: Effects that are fitted in each step of a search, at most.
+        promising: Share of the best expected gain below which an effect is not fitted.
+        worthless: Expected gain below which none is [nats].
+        steps: Levenberg-Marquardt steps from each start of an effect.
+        unproven: Effects that need not transfer to held-out recordings, at most.
+        close_call: Evidence within which a rival of an effect is fitted to the end [nats].
+        richer_by: Lead that a rich law must have over the simple one that it contains [nats].
+    """
+
+    considered: ClassVar[int]
+    promising: ClassVar[float]
+    worthless: ClassVar[float]
+    steps: ClassVar[int]
+    unproven: ClassVar[int]
+    close_call: ClassVar[float]
+    richer_by: ClassVar[float]
+
+    @abstractmethod
+    def looks_for(self, name: str, effect: Effect) -> bool:
+        """Whether an effect "site/kind" is one of those that may be named by this evidence."""
+
+    @property
+    @abstractmethod
+    def log(self) -> Log:
+        """The recordings."""
+
+    @property
+    @abstractmethod
+    def simulator(self) -> AnalyticSimulator:
+        """The engine."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> int:
+        """Number of errors that count as independent."""
+
+    @property
+    @abstractmethod
+    def blocks(self) -> np.ndarray:
+        """Number of the stretch of time to which each white error belongs, shape of `Fit.white`."""
+
+    @property
+    @abstractmethod
+    def runs(self) -> np.ndarray:
+        """Number of the recording to which each white error belongs, shape of `Fit.white`."""
+
+    @abstractmethod
+    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+        """Values, and what is else held fixed, in turn until neither gains more."""
+
+    @abstractmethod
+    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+        """Evidence that what a fit has beside a smaller one must gain beyond its penalty [nats].
+
+        Args:
+            smaller: The smaller fit.
+            larger: The larger fit.
+            explained: What the smaller one explains already [nats].
+        """
+
+    @abstractmethod
+    def holds(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether what a fit has beside a smaller one shows in recordings that it was not fitted to."""
+
+    @abstractmethod
+    def lead(self, fit: Fit, other: Fit, score: float) -> float:
+        """By how much a fit is better than one of other effects [nats].
+
+        Args:
+            fit: The fit.
+            other: The other one.
+            score: Penalised evidence that the fit has beyond the other one [nats].
+        """
+
+    @abstractmethod
+    def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
+        """By how many standard deviations a fit explains the recordings better than a rival.
+
+        Args:
+            fit: The fit.
+            rival: Another one with as many numbers, or nearly.
+            lead: Evidence that the fit has beyond the rival [nats].
+            overstated: By how much evidence is, see `robust.inflation`.
+        """
+
+    @abstractmethod
+    def loosened(self, fit: Fit) -> Any:
+        """Levels from which a fit sees less of a misfit that it got stuck in."""
+
+    @abstractmethod
+    def spread_for(self, model: Model, levels: Any) -> Any:
+        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
+
+    @abstractmethod
+    def refined(self) -> Self:
+        """The same with half the step of the simulator."""
+
+    @abstractmethod
+    def without(self, recording: int) -> Self:
+        """The same with a recording that does not count."""
+
+    @abstractmethod
+    def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """A fit as its innovations show it, and what fits by innovations."""
+
+    @abstractmethod
+    def sketched_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """The same with noise that need not suit it best: enough for first guesses."""
+
+    @abstractmethod
+    def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
+        """Log-likelihood of each recording, shape (R,), for white errors of the shape of `Fit.white`."""
+
+    @abstractmethod
+    def errors_of(self, batch: ModelBatch, levels: Any, model: Model) -> np.ndarray:
+        """Errors of P models, shape (P, ...).
+
+        Args:
+            batch: The models.
+            levels: What is held fixed.
+            model: Whose sensors the errors are seen with.
+        """
+
+    @abstractmethod
+    def noise_of(self, errors: np.ndarray, levels: Any, model: Model) -> Sequence[Noise]:
+        """What makes the errors of each of P models white; arguments as `errors_of` has them."""
+
+    @abstractmethod
+    def whitened(self, errors: np.ndarray, noise: Noise) -> np.ndarray:
+        """Errors (P, ...) made white, of the shape (P, *white)."""
+
+    def fit(self, hypothesis: Hypothesis, levels: Any, *, steps: int = 6) -> Fit:
+        """The best values at given levels, from the hypothesis' own values on.
+
+        Args:
+            hypothesis: Where to start.
+            levels: What is held fixed.
+            steps: Levenberg-Marquardt steps at most.
+        """
+        here = self._started(hypothesis, levels)
+        if not len(hypothesis.cube):
+            return here
+        for _ in range(steps):
+            deviations = 1.0 / np.sqrt(np.maximum(np.sum(here.jacobian**2, axis=0), 1e-12))
+            there = self._best_of(here, self._proposals(here))
+            gain = there.log_likelihood - here.log_likelihood
+            here = self._resloped(there if gain > 0.0 else here, np.clip(SECANT * deviations, 1e-6, LARGEST_STEP))
+            if gain < SETTLED:
+                break
+        return here
+
+    def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
+        """White errors of other models, with levels and noise of a fit, shape (P, N)."""
+        errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)
+        return self.whitened(errors, fit.noise).reshape(batch.size, -1)
+
+    def likeliest(self, hypotheses: Sequence[Hypothesis], levels: Any, count: int) -> list[Hypothesis]:
+        """The likeliest few of hypotheses of the same effects, as they are."""
+        return [hypotheses[i] for i in np.argsort(-self.likelihoods_of(hypotheses, levels))[:count]]
+
+    def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: Any) -> np.ndarray:
+        """Log-likelihoods of hypotheses of the same effects, as they are."""
+        cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
+        space, model = hypotheses[0].space, hypotheses[0].model
+        noise = self.noise_of(self.errors_of(space.batch(cubes), levels, model), levels, model)
+        return np.array([each.log_likelihood for each in noise]) - 0.5 * np.sum(
+            space.prior_residuals(cubes) ** 2, axis=1
+        )
+
+    def _started(self, hypothesis: Hypothesis, levels: Any) -> Fit:
+        """The values of a hypothesis as they are, with first slopes."""
+        cubes = _around(hypothesis.cube, np.full(len(hypothesis.cube), FIRST_STEP))
+        errors = self._errors(hypothesis, cubes, levels)
+        return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], errors[:1]), cubes, errors)
+
+    def _resloped(self, fit: Fit, size: np.ndarray) -> Fit:
+        """A fit with slopes over steps of the position in the cube, shape (D,)."""
+        cubes = _around(fit.hypothesis.cube, size)
+        return self._with_slopes(fit, cubes, self._errors(fit.hypothesis, cubes, fit.levels))
+
+    def _with_slopes(self, fit: Fit, cubes: np.ndarray, errors: np.ndarray) -> Fit:
+        """A fit with slopes of white errors and priors, from the positions around it and their errors."""
+        white = self.whitened(errors, fit.noise).reshape(len(cubes), -1)
+        rows = np.concatenate([white, fit.hypothesis.space.prior_residuals(cubes)], axis=1)
+        return replace(fit, jacobian=((rows[1:] - rows[0]) / np.diag(cubes[1:] - cubes[0])[:, None]).T)
+
+    def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:
+        """The likeliest of several positions in the cube, without slopes."""
+        errors = self._errors(fit.hypothesis, cubes, fit.levels)
+        return self._likeliest(fit.hypothesis, fit.levels, cubes, errors)
+
+    def _errors(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: Any) -> np.ndarray:
+        return self.errors_of(hypothesis.space.batch(cubes), levels, hypothesis.model)
+
+    def _likeliest(self, hypothesis: Hypothesis, levels: Any, cubes: np.ndarray, errors: np.ndarray) -> Fit:
+        """The likeliest of several positions in the cube by their errors (P, ...), without slopes."""
+        noise = self.noise_of(errors, levels, hypothesis.model)
+        priors = hypothesis.space.prior_residuals(cubes)
+        likelihoods = [each.log_likelihood - 0.5 * float(p @ p) for each, p in zip(noise, priors, strict=True)]
+        i = int(np.argmax(likelihoods))
+        white = self.whitened(errors[i : i + 1], noise[i])[0]
+        slopes = np.zeros((white.size + priors.shape[1], cubes.shape[1]))
+        return Fit(hypothesis.at(cubes[i]), levels, noise[i], white, self.blocks, self.rows, slopes, likelihoods[i])
+
+    def _proposals(self, fit: Fit) -> np.ndarray:
+        """Positions to try next, one for each damping, within the cube."""
+        cube = fit.hypothesis.cube
+        free = np.flatnonzero(fit.free)
+        proposals = np.repeat(cube[None], len(DAMPINGS), axis=0)
+        if not len(free):
+            return proposals[:1]
+        normal = fit.information[np.ix_(free, free)]
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+        scaled = normal / np.outer(scale, scale)
+        for i, damping in enumerate(DAMPINGS):
+            step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), fit.slope[free] / scale) / scale
+            proposals[i, free] -= step
+        return np.clip(proposals, 0.0, 1.0)
+
+
+def _around(cube: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """A position in the cube, and a step from it along each axis away from the nearer bound, shape (D + 1, D)."""
+    return np.concatenate([cube[None], cube + np.diag(np.where(cube > 0.5, -size, size))])

@@ -1,0 +1,110 @@
+"""What small forces on a joint do to the innovations: the linear response of the observer's error.
+
+A force that is not in the model moves the state; the observer takes part of that back at every row, and what it shows
+wrongly at the next one is the response (Ljung 1999, System Identification, sec. 3.2).
+"""
+
+import numpy as np
+
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.noise_model import whitened_change
+from wipx.identify.linearisation import transition_over
+from wipx.sim.cache import cached
+
+SLOW = 0.02  # of the largest speed, at which half of dry friction has built up
+FAST = 0.995  # quantile of the speed that counts as the largest
+
+
+def motion_of(fitter: InnovationFitter, fit: Fit) -> dict[str, np.ndarray]:
+    """Coordinates, rates, commands and time at every row, shape (K + 1, R) each.
+
+    Coordinates and rates are those that the fit's observer expects: a force made of them knows nothing of the
+    noise of the row that it is tested on.
+    """
+    log = fitter.log
+    plant = log.plant
+    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
+    state = fitter.follower.estimated(fit.hypothesis.model, gains, fit.levels.spread)
+    signals = {name: state[:, i] for i, name in enumerate((*plant.coordinates, *plant.rates))}
+    for c, name in enumerate(plant.commands):
+        commands = log.inputs.commands[:, c]
+        signals[name] = np.concatenate([commands, commands[-1:]])
+    signals["t"] = np.where(log.rows, log.inputs.t, 0.0)
+    return signals
+
+
+def direction(rate: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Sign of a rate (K + 1, R), without a jump where it is nearly at rest; `rows` exist."""
+    slow = SLOW * max(float(np.quantile(np.abs(rate[rows]), FAST)), 1e-12)
+    return rate / (np.abs(rate) + slow)
+
+
+def response(fitter: InnovationFitter, fit: Fit, joint: int, forces: np.ndarray) -> np.ndarray:
+    """Slopes of a fit's white innovations by the sizes of forces on a joint.
+
+    Args:
+        fitter: Of the fit.
+        fit: Whose observer and colour count.
+        joint: Index of the joint.
+        forces: At every row, of size one, shape (C, K + 1, R) [N or N m].
+
+    Returns:
+        Shape (R m (K + 1), C).
+    """
+    follower = fitter.follower
+    linear, log = follower.linear, follower.log
+    gains = follower.gains(fit.levels, fit.hypothesis.model)
+    innovations = np.zeros((len(forces), *fit.white.shape))
+    innovations[:, :, : len(log.channels)] = _driven(
+        linear.a,
+        linear.b[:, :, joint].copy(),
+        linear.place,
+        log.intervals,
+        log.inputs.last,
+        log.channels,
+        gains.gains,
+        gains.whitening,
+        np.ascontiguousarray(forces.T),
+    ).T
+    return whitened_change(innovations, fit.noise, log).reshape(len(forces), -1).T
+
+
+@cached
+def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
+    """White innovations (K + 1, m, R, C) that forces (R, K + 1, C) cause; all columns of a row lie side by side."""
+    recordings, rows, columns = forces.shape
+    joints = a.shape[1]
+    n, m = 2 * joints, len(channels)
+    out = np.zeros((rows, m, recordings, columns))
+    transition, kept, show = np.zeros((n, n)), np.zeros((n, n)), np.zeros((m, n))
+    for r in range(recordings):
+        states, moved = np.zeros((n, columns)), np.zeros((n, columns))
+        for k in range(last[r] + 1):
+            for d in range(m):
+                for i in range(m):
+                    show[d, channels[i]] = -whitening[k, r, d, i]
+            _add_product(out[k, :, r], show, states)
+            if k == last[r]:
+                break
+            dt, g = intervals[k, r], place[k, r]
+            transition_over(a[g], dt, transition)
+            kept[:] = transition
+            _add_product(kept, transition, -gains[k, r])
+            for i in range(joints):
+                for c in range(columns):
+                    rate = dt * b[g, i] * forces[r, k, c]
+                    moved[i, c], moved[joints + i, c] = 0.5 * dt * rate, rate
+            _add_product(moved, kept, states)
+            states, moved = moved, states
+    return out
+
+
+@cached
+def _add_product(total, weights, states):
+    """Add the product of two matrices; the second has many columns."""
+    for i in range(len(total)):
+        for j in range(len(states)):
+            weight = weights[i, j]
+            for c in range(states.shape[1]):
+                total[i, c] += weight * states[j, c]

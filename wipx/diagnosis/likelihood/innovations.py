@@ -1,0 +1,283 @@
+"""Evidence of one row ahead: the likelihood of innovations, with the noise that suits a hypothesis best.
+
+Levenberg-Marquardt steps with observer and colour held fixed, in turn with a search over the noise levels.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from wipx.core.effect import Effect
+from wipx.core.model import Model, ModelBatch
+from wipx.diagnosis.likelihood import nonsmooth_search
+from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.noise_model import Colour, colour_of, whitened
+from wipx.diagnosis.likelihood.observer import NoiseLevels
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.sandwich import stretches
+from wipx.sim.analytic import AnalyticSimulator
+
+LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
+LEVEL_RANGE = 14.0  # of the same, about the first guess
+LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
+THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
+SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
+LEAST_SHARE = 0.01  # of what is explained already
+MOST_ASKED = 80.0  # nats that the share asks for, at most
+LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
+
+
+@dataclass(frozen=True)
+class InnovationFitter(Fitter):
+    """Fits hypotheses to the innovations of a follower."""
+
+    considered = 6
+    promising = 0.05
+    worthless = 3.0
+    steps = 5
+    unproven = 4  # small ones easily fill up what nothing explains
+    close_call = 60.0
+    richer_by = 4.0
+
+    follower: Follower
+
+    def looks_for(self, name: str, effect: Effect) -> bool:
+        """Those of contract section 3."""
+        return not effect.beyond
+
+    @property
+    def log(self) -> Log:
+        """The recordings."""
+        return self.follower.log
+
+    @property
+    def simulator(self) -> AnalyticSimulator:
+        """The engine."""
+        return self.follower.simulator
+
+    @property
+    def rows(self) -> int:
+        """Rows that count."""
+        return int(self.log.counted.sum())
+
+    @cached_property
+    def blocks(self) -> np.ndarray:
+        """Number of the stretch of time of every innovation, shape (R, m, K + 1)."""
+        return np.repeat(stretches(self.log)[:, None], self.log.signals, axis=1)
+
+    @property
+    def runs(self) -> np.ndarray:
+        """Number of the recording of every innovation, shape (R, m, K + 1)."""
+        return np.broadcast_to(np.arange(len(self.blocks))[:, None, None], self.blocks.shape)
+
+    def refined(self) -> "InnovationFitter":
+        """The same with half the step of the simulator."""
+        return InnovationFitter(
+            replace(self.follower, simulator=replace(self.simulator, step=0.5 * self.simulator.step))
+        )
+
+    def without(self, recording: int) -> "InnovationFitter":
+        """The same with a recording that does not count."""
+        return InnovationFitter(replace(self.follower, log=replace(self.log, left_out=recording)))
+
+    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+        """So much that no search over many effects finds it by chance, and a share of what is explained."""
+        added = [effect for effect in larger.effects if effect not in smaller.effects]
+        share = nonsmooth_search.SHARE if nonsmooth_search.leaves_open(smaller, added) else LEAST_SHARE
+        return max(LEAST_GAIN, min(share * explained, MOST_ASKED))
+
+    def holds(self, smaller: Fit, larger: Fit) -> bool:
+        """Always: where laws hold, their likelihood says all."""
+        return True
+
+    def lead(self, fit: Fit, other: Fit, score: float) -> float:
+        """The penalised evidence."""
+        return score
+
+    def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
+        """As if one number more made the difference: a likelihood ratio."""
+        return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
+
+    def loosened(self, fit: Fit) -> NoiseLevels:
+        """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
+        return replace(fit.levels, force=LOUDER * fit.levels.force)
+
+    def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """The fit itself."""
+        return self, fit
+
+    def sketched_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
+        """The fit itself."""
+        return self, fit
+
+    def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
+        """Log-likelihood of each recording, shape (R,), for white innovations (R, m, K + 1)."""
+        diagonal = np.einsum("krcc->rkc", self.follower.gains(fit.levels, fit.hypothesis.model).whitening)
+        counted = self.log.counted.T
+        scale = np.where(counted, np.log(np.where(diagonal > 0.0, diagonal, 1.0)).sum(axis=2), 0.0)
+        scale += counted * np.log(np.diag(fit.noise.whitening)).sum()
+        return np.sum(scale - 0.5 * np.sum(white**2, axis=1), axis=1)
+
+    def errors_of(self, batch: ModelBatch, levels: NoiseLevels, model: Model) -> np.ndarray:
+        """Innovations, shape (P, R, m, K + 1)."""
+        gains = self.follower.gains(levels, model)
+        same = np.zeros(batch.size, dtype=np.int64)
+        return self.follower.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
+
+    def noise_of(self, errors: np.ndarray, levels: NoiseLevels, model: Model) -> list[Colour]:
+        """The colour of each model's innovations."""
+        scale = _log_determinant(self.follower.gains(levels, model).whitening, self.log)
+        colours = [colour_of(each, self.log) for each in errors]
+        return [replace(colour, log_likelihood=colour.log_likelihood + scale) for colour in colours]
+
+    def whitened(self, errors: np.ndarray, noise: Colour) -> np.ndarray:
+        """White innovations, shape (P, R, m, K + 1)."""
+        return whitened(errors, noise, self.log)
+
+    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+        """Noise levels and values in turn until neither gains more."""
+        for _ in range(rounds):
+            before = fit.log_likelihood
+            fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
+            if fit.log_likelihood - before < POLISHED:
+                break
+        return fit
+
+    def levels_of(self, fit: Fit) -> NoiseLevels:
+        """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
+
+        The levels' common factor does not matter: the first sensor's level is kept.
+
+        Args:
+            fit: Where to start.
+        """
+        fixed = len(fit.levels.force)
+        levels = self.spread_for(fit.hypothesis.model, fit.levels)
+        search = _LevelSearch(self, fit.hypothesis, levels)
+        centre = best = _logarithms(levels)
+        free = [i for i in range(len(best)) if i != fixed]
+        for step in LEVEL_STEPS:
+            move = np.zeros_like(best)
+            for _ in range(12):
+                trials = [best + sign * step * np.eye(len(best))[i] for i in free for sign in (-1.0, 1.0)]
+                if np.count_nonzero(move) > 1:
+                    trials.append(best + move)
+                trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
+                likelihoods = search.likelihoods([best, *trials])
+                gains = likelihoods[1:] - likelihoods[0]
+                move = _joined(gains[: 2 * len(free)], step, free, len(best))
+                if gains.max() <= LEVEL_GAIN:
+                    break
+                best = trials[int(gains.argmax())]
+        return _levels(best, levels)
+
+    def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
+        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
+        kinds = {name.partition("/")[2] for name in model.effects}
+        matters = self.log.has_means and not kinds.isdisjoint(THRESHOLDS)
+        if matters == (levels.spread > 0.0):
+            return levels
+        return replace(levels, spread=1.0 if matters else 0.0)
+
+    def _with_best_spread(self, fit: Fit) -> Fit:
+        """A fit with the spread of single commands that suits it best, where it has one.
+
+        Thresholds are tied to the spread, so the values follow it at every try.
+        """
+        for factor in (SPREAD, 1.0 / SPREAD) if fit.levels.spread > 0.0 else ():
+            change = factor
+            while True:
+                there = self._at_spread(fit, change)
+                if there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
+                    fit, change = there, change**2
+                elif change != factor:
+                    change = factor
+                else:
+                    break
+        return fit
+
+    def _at_spread(self, fit: Fit, change: float) -> Fit:
+        levels = replace(fit.levels, spread=change * fit.levels.spread)
+        return self.fit(fit.hypothesis, levels, steps=3)
+
+    def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
+        """Log-likelihoods of hypotheses of the same effects, as they are."""
+        cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
+        gains = [self.follower.gains(levels, hypothesis.model) for hypothesis in hypotheses]
+        alike = np.array([next(i for i, other in enumerate(gains) if other is own) for own in gains])
+        different, group = np.unique(alike, return_inverse=True)
+        observers = tuple(gains[i] for i in different)
+        batch = hypotheses[0].space.batch(cubes)
+        innovations = self.follower.innovations(batch, observers, group, np.full(batch.size, levels.spread))
+        scales = [_log_determinant(observer.whitening, self.follower.log) for observer in observers]
+        priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
+        log = self.follower.log
+        likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
+        return likelihoods + np.array(scales)[group]
+
+    def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[float]:
+        """Log-likelihoods of one model with several noise levels."""
+        log = self.follower.log
+        gains = self.follower.gains_of(levels, hypothesis.model)
+        count = len(levels)
+        batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
+        spread = np.array([level.spread for level in levels])
+        innovations = self.follower.innovations(batch, gains, np.arange(count), spread)
+        priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
+        return [
+            _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
+            for g, each in zip(gains, innovations, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class _LevelSearch:
+    """Likelihoods of one model by the logarithms of noise levels, each asked for once."""
+
+    fitter: InnovationFitter
+    hypothesis: Hypothesis
+    levels: NoiseLevels
+    known: dict[tuple[float, ...], float] = field(default_factory=dict)
+
+    def likelihoods(self, points: Sequence[np.ndarray]) -> np.ndarray:
+        """Log-likelihoods of points; those that are not known yet are simulated at once."""
+        fresh = {_key(point): point for point in points if _key(point) not in self.known}
+        if fresh:
+            levels = [_levels(point, self.levels) for point in fresh.values()]
+            self.known.update(zip(fresh, self.fitter.likelihoods(self.hypothesis, levels), strict=True))
+        return np.array([self.known[_key(point)] for point in points])
+
+
+def _key(point: np.ndarray) -> tuple[float, ...]:
+    """Logarithms of levels, free of rounding."""
+    return tuple(np.round(point, 6).tolist())
+
+
+def _logarithms(levels: NoiseLevels) -> np.ndarray:
+    return np.log(np.concatenate([levels.force, levels.sensor]))
+
+
+def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
+    values = np.exp(logarithms)
+    joints = len(like.force)
+    return NoiseLevels(values[:joints], values[joints:], like.spread)
+
+
+def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.ndarray:
+    """All single moves that gained, made at once; gains in pairs (-, +) for each free level."""
+    move = np.zeros(count)
+    for i, index in enumerate(free):
+        down, up = gains[2 * i], gains[2 * i + 1]
+        if max(down, up) > 0.0:
+            move[index] = step if up > down else -step
+    return move
+
+
+def _log_determinant(whitening: np.ndarray, log) -> float:
+    """Sum of log det of the whitening over the rows that count."""
+    diagonal = np.einsum("krcc->krc", whitening)[log.counted]
+    return float(np.log(diagonal.prod(axis=1)).sum())

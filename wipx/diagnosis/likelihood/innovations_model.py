@@ -1,0 +1,186 @@
+"""Innovations: recorded minus what a model, kept close by the observer, shows one row ahead."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from wipx.core.model import Model, ModelBatch
+from wipx.diagnosis.likelihood.noise_model import LARGEST
+from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.identify.linearisation import Linearisation, linearise_along
+from wipx.identify.prediction import true_state
+from wipx.sim.analytic import AnalyticSimulator, Observer
+from wipx.sim.cache import cached
+from wipx.sim.simulator import Rollouts
+
+GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
+TAPS = 3  # rows of the modelled force that a report may be made of
+DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
+TOGETHER = 16  # rows of all models that are turned into innovations before the next
+MOST_KNOWN = 20  # gains that are kept; each holds as much as some ten recordings
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Follows recordings with any model.
+
+    Attributes:
+        simulator: The engine.
+        log: The recordings.
+        linear: The nominal body about the places that they visit.
+    """
+
+    simulator: AnalyticSimulator
+    log: Log
+    linear: Linearisation
+    _known: dict[tuple[bytes, tuple[float, ...]], Gains] = field(default_factory=dict, compare=False, repr=False)
+
+    @classmethod
+    def of(cls, simulator: AnalyticSimulator, log: Log, nominal: Model) -> "Follower":
+        """A follower of recordings whose gains are those of the nominal body."""
+        return cls(simulator, log, linearise_along(nominal, log.measured[:, : log.joints]))
+
+    def gains(self, levels: NoiseLevels, model: Model) -> Gains:
+        """Gains for noise levels and for the sensor delays of a model."""
+        return self.gains_of((levels,), model)[0]
+
+    def gains_of(self, levels: Sequence[NoiseLevels], model: Model) -> tuple[Gains, ...]:
+        """Gains for each of several noise levels, all that are not known yet at once."""
+        taus = [model.effects.get(f"sensor_{name}/delay", {}).get("tau", 0.0) for name in model.plant.coordinates]
+        delays = tuple(round(tau / DELAY_GRID) * DELAY_GRID for tau in taus)
+        keys = [(np.concatenate([level.force, level.sensor]).tobytes(), delays) for level in levels]
+        missing = {key: level for key, level in zip(keys, levels, strict=True) if key not in self._known}
+        if missing:
+            if len(self._known) > MOST_KNOWN:
+                self._known.clear()
+                return self.gains_of(levels, model)
+            found = observer_gains(self.linear, self.log, list(missing.values()), delays)
+            self._known.update(zip(missing, found, strict=True))
+        return tuple(self._known[key] for key in keys)
+
+    def innovations(
+        self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray
+    ) -> np.ndarray:
+        """Innovations in standard deviations of the observer, then errors of reported forces, shape (P, R, m, K + 1).
+
+        Args:
+            batch: P models.
+            gains: Of one or more observers.
+            group: Which of them each model has, shape (P,).
+            spread: Of the single commands, in multiples of `Log.command_spread`, shape (P,).
+        """
+        log = self.log
+        shown = self._shown(batch, gains, group, spread)
+        whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
+        found = np.zeros((batch.size, len(log.recordings), log.signals, len(log.rows)))
+        _innovations(
+            log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last, found
+        )
+        if shown.delivered is not None:
+            _report_errors(log.reported, shown.delivered, log.counted, log.inputs.last, len(log.channels), found)
+        return found
+
+    def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
+        """Coordinates and rates that a model expects before it sees each row, shape (K + 1, 2 joints, R)."""
+        shown = self._shown(ModelBatch(model), (gains,), np.zeros(1, dtype=np.int64), np.array([spread]))
+        return np.concatenate([shown.coordinates, shown.rates], axis=1)[:, :, 0]
+
+    def _shown(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray) -> Rollouts:
+        start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
+        corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
+        return self.simulator.follow(
+            batch,
+            self.log.inputs,
+            start,
+            Observer(
+                self.log.measured,
+                corrections,
+                group,
+                np.outer(spread, self.log.command_spread),
+                reports=self.log.reported.shape[1] > 0,
+            ),
+        )
+
+    @cached_property
+    def _first_rows(self) -> np.ndarray:
+        """Recorded coordinates and mean rates at each recording's start, shape (2 joints, R)."""
+        log = self.log
+        first = log.measured[0].copy()
+        for r in range(first.shape[1]):
+            t = log.inputs.t[:, r] - log.inputs.t[0, r]
+            count = min(max(4, int(np.searchsorted(t, GUESS_SPAN))), int(log.inputs.last[r]) + 1)
+            for j in range(log.joints):
+                fit = np.polynomial.polynomial.polyfit(t[:count], log.measured[:count, j, r], min(2, count - 1))
+                first[[j, log.joints + j], r] = fit[0], fit[1]
+        return first
+
+
+@cached
+def _innovations(measured, coordinates, rates, channels, whitening, group, last, out):
+    """White errors of what is shown, some rows of all models at a time: the arrays run along models or along rows."""
+    rows, joints, models, recordings = coordinates.shape
+    m = len(channels)
+    error = np.zeros(m)
+    for begin in range(0, rows, TOGETHER):
+        for p in range(models):
+            g = group[p]
+            for r in range(recordings):
+                for k in range(begin, min(begin + TOGETHER, last[r] + 1)):
+                    for c in range(m):
+                        i = channels[c]
+                        shown = coordinates[k, i, p, r] if i < joints else rates[k, i - joints, p, r]
+                        error[c] = measured[k, i, r] - shown
+                    for c in range(m):
+                        total = 0.0
+                        for d in range(c + 1):
+                            total += whitening[g, k, r, c, d] * error[d]
+                        # Also where it is not a number: a model that fell over is only counted so far.
+                        out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
+
+
+@cached
+def _report_errors(reported, delivered, counted, last, first, out):
+    """Reported forces minus a + sum_i b_i F[k - i] of the modelled force F, by least squares for each model.
+
+    A drive's torque constant and zero are not trusted, nor the instant at which it reads its current, up to TAPS - 1
+    rows late: what counts is the course of the force.
+    """
+    for i in range(reported.shape[1]):
+        size = max(np.std(reported[:, i]), 1e-12)
+        for p in range(delivered.shape[2]):
+            forces = delivered[:, i, p].T.copy()
+            weights, finite = _report_weights(reported[:, i], forces, counted, size)
+            for r in range(len(forces)):
+                errors = out[p, r, first + i]
+                errors[TAPS - 1 : last[r]] = reported[TAPS - 1 : last[r], i, r] - weights[0]
+                for tap in range(TAPS):
+                    errors[TAPS - 1 : last[r]] -= weights[1 + tap] * forces[r, TAPS - 1 - tap : last[r] - tap]
+                for k in range(TAPS - 1, last[r]):
+                    errors[k] = min(max(10.0 * errors[k] / size, -LARGEST), LARGEST) if finite else LARGEST
+
+
+@cached
+def _report_weights(reported, forces, counted, size):
+    """Zero and weights of one drive's report, and whether the modelled force is finite."""
+    normal, right = 1e-9 * size * size * np.eye(1 + TAPS), np.zeros(1 + TAPS)
+    for r in range(len(forces)):
+        begin = max(np.argmax(counted[:, r]), TAPS - 1)  # rows that count follow each other
+        end = max(begin, np.argmax(counted[:, r]) + counted[:, r].sum() - 1)  # the last row has no force
+        shown = reported[begin:end, r].copy()
+        normal[0, 0] += len(shown)
+        right[0] += shown.sum()
+        for a in range(TAPS):
+            force = forces[r, begin - a : end - a]
+            normal[0, 1 + a] += force.sum()
+            right[1 + a] += force @ shown
+            for b in range(a + 1):
+                normal[1 + b, 1 + a] += force @ forces[r, begin - b : end - b]
+    for a in range(1 + TAPS):
+        for b in range(a):
+            normal[a, b] = normal[b, a]
+    if not np.all(np.isfinite(normal)):
+        return np.zeros(1 + TAPS), False
+    return np.linalg.solve(normal, right), True

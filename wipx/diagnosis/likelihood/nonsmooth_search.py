@@ -1,0 +1,134 @@
+"""Search by trial where the likelihood is rough.
+
+A drive that meets its flank a step earlier or later makes small kinks in the likelihood, between which slopes over
+small steps lead nowhere. Trials at random distances, ever smaller, see what the kinks hide (an evolution strategy with
+a given schedule: Beyer, Schwefel 2002, Natural Computing 1). Noisy commands that change with every row make the
+likelihood of a delay ripple too, with peaks closer than the rows; fits start from the highest ones.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.observer import NoiseLevels
+
+ROUGH = ("backlash",)
+DELAY, LATE = "actuator/delay", "actuator/backlash.contact_time"
+RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
+WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
+ALONG = 2.0  # times that, along the ridge
+LONGEST = 0.04  # [s] of a delay that is guessed closely; longer ones must show from afar
+FASTEST = 1e-3  # [s] between rows; in faster logs the guesses are no closer
+PER_ROW = 8  # guesses over one row
+TOGETHER = 24  # guesses that are simulated at once; bounds the memory
+PEAKS = 4  # from which a fit starts
+LEAST = 0.02  # of the search interval, that a number counts at least
+TRIALS = 40  # at each width
+FACTORS = np.geomspace(1.0 / 8.0, 8.0, 10)  # along the ridge, that are looked at for as good a fit
+CHANCE = 1.92  # nats, half of the 95 % quantile of chi squared with one degree of freedom
+SHARE = 0.05  # of what is explained, that a law leaves open which others follow roughly only
+MOST = 80.0  # nats of it
+
+
+def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
+    """Whether what the laws of a fit follow roughly only may look like further effects.
+
+    It looks like others of the drive. A delay is none of them: flanks that give way are late themselves.
+    """
+    return is_rough(fit) and any(effect.startswith("actuator/") and effect != DELAY for effect in added)
+
+
+def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
+    """Values of a fit beside which a further effect is tried: its own, and those that do without what hides it."""
+    values = fit.hypothesis.values
+    return [values, {**values, LATE: 0.0}] if hides(fit, effect) else [values]
+
+
+def hides(fit: Fit, effect: str) -> bool:
+    """Whether slopes do not show what an effect would explain: late flanks have the place of a delay."""
+    return effect == DELAY and LATE in fit.hypothesis.values
+
+
+def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
+    """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
+    intervals = fitter.log.intervals
+    row = max(float(np.median(intervals[intervals > 0.0])), FASTEST)
+    guesses = np.arange(row, max(PER_ROW * LONGEST, 2.0 * row), row) / PER_ROW
+    values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)
+    values[:, begin.parameters_of(DELAY)[0]] = guesses
+    tried = [begin.at(cube) for cube in begin.space.to_cube(values)]
+    parts = [tried[i : i + TOGETHER] for i in range(0, len(tried), TOGETHER)]
+    found = np.concatenate([fitter.likelihoods_of(part, levels) for part in parts])
+    padded = np.concatenate([[-np.inf], found, [-np.inf]])
+    peak = (found > padded[:-2]) & (found >= padded[2:])
+    highest = sorted(np.flatnonzero(peak), key=lambda i: -found[i])[:PEAKS]
+    return [tried[i] for i in highest]
+
+
+def is_rough(fit: Fit) -> bool:
+    """Whether a fit has an effect that makes the likelihood rough."""
+    return any(effect.partition("/")[2] in ROUGH for effect in fit.effects)
+
+
+def explored(fitter: Fitter, fit: Fit) -> Fit:
+    """A fit, or a better one at the same noise with other numbers of its rough effects, where it has any."""
+    if not is_rough(fit):
+        return fit
+    space = fit.hypothesis.space
+    rough, ridge, powers = _numbers(fit)
+    least = np.array([LEAST * (space.free[i].high - space.free[i].low) for i in rough])
+    rng = np.random.default_rng(0)
+    best, cost = fit.hypothesis.cube, _costs(fitter, fit, fit.hypothesis.cube[None])[0]
+    for width in WIDTHS:
+        values = np.repeat(space.to_values(best[None]), TRIALS, axis=0)
+        size = width * np.maximum(np.abs(values[:, rough]), least)
+        values[:, rough] += size * rng.standard_normal(size.shape)
+        values[:, ridge] *= np.exp(ALONG * width * rng.standard_normal((TRIALS, 1)) * powers)
+        trials = space.to_cube(np.maximum(values, space.to_values(np.zeros(len(best)))))
+        costs = _costs(fitter, fit, trials)
+        if costs.min() < cost:
+            best, cost = trials[int(costs.argmin())], float(costs.min())
+    found = fitter.fit(fit.hypothesis.at(best), fit.levels)
+    return found if found.log_likelihood > fit.log_likelihood else fit
+
+
+def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
+    """Positions in the cube along the ridge that explain the recordings about as well as a fit, itself included.
+
+    Args:
+        fitter: Of the fit.
+        fit: The fit.
+        explained: What it explains [nats].
+
+    Returns:
+        Shape (at least 1, D).
+    """
+    found = [fit.hypothesis.cube]
+    if is_rough(fit):
+        space = fit.hypothesis.space
+        _, ridge, powers = _numbers(fit)
+        least = fit.log_likelihood - float(np.clip(SHARE * explained, CHANCE, MOST))
+        for factor in FACTORS:
+            values = space.to_values(fit.hypothesis.cube)
+            values[ridge] *= factor**powers
+            there = fitter.fit(fit.hypothesis.at(space.to_cube(values)), fit.levels, steps=3)
+            if there.log_likelihood >= least:
+                found.append(there.hypothesis.cube)
+    return np.array(found)
+
+
+def _numbers(fit: Fit) -> tuple[list[int], list[int], np.ndarray]:
+    """Indices of the rough effects' numbers, of those along the ridge, and the powers with which these change there."""
+    names = fit.hypothesis.space.names
+    rough = [i for e in fit.effects if e.partition("/")[2] in ROUGH for i in fit.hypothesis.parameters_of(e)]
+    ridge = [i for i in rough if names[i].rpartition(".")[2] in RIDGE]
+    return rough, ridge, np.array([1.0 if names[i].endswith(f".{RIDGE[0]}") else -1.0 for i in ridge])
+
+
+def _costs(fitter: Fitter, fit: Fit, cubes: np.ndarray) -> np.ndarray:
+    """Negative log-likelihoods, up to a constant [nats]."""
+    space = fit.hypothesis.space
+    priors = np.sum(space.prior_residuals(cubes) ** 2, axis=1)
+    return 0.5 * (np.sum(fitter.white_of(fit, space.batch(cubes)) ** 2, axis=1) + priors)

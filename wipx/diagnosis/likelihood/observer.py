@@ -1,0 +1,258 @@
+"""The observer that follows a recording: Kalman gains along it, for given levels of noise.
+
+The covariance obeys the Riccati recursion of the linearised rigid body, x' = A x + B f, where f is
+white noise of the generalised forces and the sensors add white noise (Kristensen, Madsen,
+Jorgensen 2004, Parameter estimation in stochastic grey-box models, Automatica 40(2)). Only gains are
+taken from it; the state itself follows the nonlinear model.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.diagnosis.likelihood.recording_batch import SETTLES, Log
+from wipx.identify.linearisation import Linearisation, transition_over
+from wipx.sim.cache import cached
+
+UNSETTLED = 100.0  # how much noisier forces count while the state is settling
+DIFFUSE = 1e4  # how much larger the variance of the first state is, which is read off noisy, perhaps late sensors
+BEFORE = 1.0  # how fast a joint moves before its recording, at most [m/s, rad/s]
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """Standard deviations of white noise.
+
+    Attributes:
+        force: On each joint, shape (joints,), spectral [N s^0.5 or N m s^0.5].
+        sensor: Of each recorded channel, shape (m,) [unit of the column].
+        spread: Half width by which single commands scatter about the mean that the log has, in multiples of
+            `Log.command_spread`.
+    """
+
+    force: np.ndarray
+    sensor: np.ndarray
+    spread: float = 0.0
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains and innovation covariances of one set of noise levels.
+
+    Attributes:
+        gains: Shape (K + 1, R, 2 joints, 2 joints), from channels to states.
+        whitening: Inverse Cholesky factor of the innovations' covariance, shape (K + 1, R, m, m).
+    """
+
+    gains: np.ndarray
+    whitening: np.ndarray
+
+
+def observer_gains(
+    linear: Linearisation, log: Log, levels: Sequence[NoiseLevels], delays: tuple[float, ...] | None = None
+) -> tuple[Gains, ...]:
+    """Kalman gains along every recording, for each of several noise levels.
+
+    Args:
+        linear: The body.
+        log: The recordings.
+        levels: Noise.
+        delays: Delay of each coordinate's sensor [s]; None for none.
+    """
+    late = np.zeros(log.joints) if delays is None else np.array(delays)
+    n, m = 2 * log.joints, len(log.channels)
+    gains = np.zeros((len(levels), *log.rows.shape, n, n))
+    whitening = np.zeros((len(levels), *log.rows.shape, m, m))
+    _riccati(
+        linear.a,
+        linear.b,
+        linear.place,
+        log.intervals,
+        log.inputs.last,
+        log.channels,
+        np.array([level.force**2 for level in levels]),
+        np.array([level.sensor**2 for level in levels]),
+        late,
+        log.inputs.t - log.inputs.t[0],
+        gains,
+        whitening,
+    )
+    return tuple(Gains(*each) for each in zip(gains, whitening, strict=True))
+
+
+@cached
+def _correct(covariance, i, j, late, noise, half, root):
+    """The covariance after a sensor of variance `noise` has shown state i, less `late` times state j.
+
+    The covariance loses half half', where half is the gain times the deviation of the innovation, 1 / root.
+    """
+    lanes = len(noise)
+    for a in range(4):
+        for w in range(lanes):
+            half[a, w] = covariance[a, i, w] - late * covariance[a, j, w]
+    for w in range(lanes):
+        root[w] = 1.0 / np.sqrt(half[i, w] - late * half[j, w] + noise[w])
+    for a in range(4):
+        for w in range(lanes):
+            half[a, w] *= root[w]
+    for a in range(4):
+        for b in range(4):
+            for w in range(lanes):
+                covariance[a, b, w] -= half[a, w] * half[b, w]
+
+
+@cached
+def _whiten(c, i, j, late, half, root, whitening):
+    """Row c of the inverse Cholesky factor of the innovations' covariance: what earlier channels foretell is taken."""
+    lanes = root.shape[1]
+    for d in range(c):
+        whitening[c, d] = 0.0
+        for e in range(d, c):
+            for w in range(lanes):
+                whitening[c, d, w] -= root[c, w] * (half[e, i, w] - late * half[e, j, w]) * whitening[e, d, w]
+    whitening[c, c] = root[c]
+
+
+@cached
+def _predict(covariance, transition, half):
+    """The covariance one interval later, but for the forces."""
+    lanes = covariance.shape[2]
+    for a in range(4):
+        for b in range(4):
+            for w in range(lanes):
+                total = 0.0
+                for q in range(4):
+                    total += transition[a, q, w] * covariance[q, b, w]
+                half[a, b, w] = total
+    for a in range(4):
+        for b in range(a + 1):
+            for w in range(lanes):
+                total = 0.0
+                for q in range(4):
+                    total += half[a, q, w] * transition[b, q, w]
+                covariance[a, b, w] = total
+                covariance[b, a, w] = total
+
+
+@cached
+def _shake(covariance, drive, dt):
+    """What white forces, held over the interval, add to the covariance."""
+    for i in range(2):
+        for j in range(2):
+            for w in range(len(dt)):
+                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0
+                covariance[i, 2 + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[2 + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[2 + i, 2 + j, w] += drive[i, j, w] * dt[w]
+
+
+@cached
+def _combine(half, whitening, gain):
+    """Gain by which each channel's error moves the states, shape (4, m, lanes): that of all channels at once."""
+    m, _, lanes = half.shape
+    gain[:] = 0.0
+    for q in range(4):
+        for d in range(m):
+            for c in range(d, m):
+                for w in range(lanes):
+                    gain[q, d, w] += half[c, q, w] * whitening[c, d, w]
+
+
+@cached
+def _move(a, b, place, interval, force, recording, recordings, transition, drive, dt):
+    """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
+    joints = b.shape[1]
+    own = np.zeros((2 * joints, 2 * joints))
+    transition_over(a[place], interval, own)
+    for level in range(len(force)):
+        w = level * recordings + recording
+        dt[w] = interval
+        for i in range(2 * joints):
+            for j in range(2 * joints):
+                transition[_among_four(i, joints), _among_four(j, joints), w] = own[i, j]
+        for i in range(joints):
+            for j in range(joints):
+                drive[i, j, w] = 0.0
+                for q in range(joints):
+                    drive[i, j, w] += b[place, i, q] * b[place, j, q] * force[level, q]
+
+
+@cached
+def _among_four(state, joints):
+    """Place of a state of a plant among those of two joints."""
+    return state if state < joints else 2 + state - joints
+
+
+@cached
+def _begin(covariance, sensor, time, k):
+    """At the first row the state is hardly known; once it has settled, as well as the sensors tell.
+
+    Coordinates are then known within some noise, rates within that over 20 ms; `sensor` has the variances of the
+    coordinates, shape (L, joints).
+    """
+    (levels, joints), recordings = sensor.shape, time.shape[1]
+    for r in range(recordings):
+        if k == 0 or time[k - 1, r] <= SETTLES < time[k, r]:
+            factor = DIFFUSE if k == 0 else 1.0
+            covariance[:, :, r::recordings] = 0.0
+            for level in range(levels):
+                for j in range(joints):
+                    covariance[j, j, level * recordings + r] = 9.0 * factor * sensor[level, j]
+                    covariance[2 + j, 2 + j, level * recordings + r] = 9.0 * factor * sensor[level, j] / 0.02**2
+
+
+@cached
+def _hear(sensor, time, delay, noise):
+    """Variance of a sensor's noise: a late one shows at first what was before the recording, at unknown speeds."""
+    for level in range(len(sensor)):
+        for r in range(len(time)):
+            noise[level * len(time) + r] = sensor[level] + (BEFORE * max(delay - time[r], 0.0)) ** 2
+
+
+@cached
+def _store(gain, inverse, channels, exists, gains, whitening):
+    """Write gains (L, R, n, n) and whitening (L, R, m, m) of one row, where a recording has it."""
+    levels, recordings, n, _ = gains.shape
+    for level in range(levels):
+        for r in range(recordings):
+            if exists[r]:
+                w = level * recordings + r
+                for c in range(len(channels)):
+                    for i in range(n):
+                        gains[level, r, i, channels[c]] = gain[_among_four(i, n // 2), c, w]
+                    for d in range(c + 1):
+                        whitening[level, r, c, d] = inverse[c, d, w]
+
+
+@cached
+def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, gains, whitening):
+    """Fill in gains (L, K + 1, R, n, n) and whitening (L, K + 1, R, m, m) of L noise levels.
+
+    A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes. A joint
+    that a plant lacks stays at zero, so that the other loops have constant lengths.
+    """
+    rows, recordings = place.shape
+    joints, m = b.shape[1], len(channels)
+    lanes = len(force) * recordings
+    covariance, work, transition = np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes))
+    drive, dt, noise = np.zeros((2, 2, lanes)), np.zeros(lanes), np.zeros(lanes)
+    half, root = np.zeros((m, 4, lanes)), np.zeros((m, lanes))
+    inverse, gain = np.zeros((m, m, lanes)), np.zeros((4, m, lanes))
+    for k in range(rows):
+        _begin(covariance, sensor[:, :joints], time, k)
+        for c in range(m):
+            i = _among_four(channels[c], joints)
+            j, delay = (i + 2, late[channels[c]]) if i < 2 else (i, 0.0)
+            _hear(sensor[:, c], time[k], delay, noise)
+            _correct(covariance, i, j, delay, noise, half[c], root[c])
+            _whiten(c, i, j, delay, half, root, inverse)
+        _combine(half, inverse, gain)
+        _store(gain, inverse, channels, k <= last, gains[:, k], whitening[:, k])
+        if k == rows - 1:
+            break
+        for r in range(recordings):
+            louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
+            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, transition, drive, dt)
+        _predict(covariance, transition, work)
+        _shake(covariance, drive, dt)

@@ -1,0 +1,1 @@
+"""What to record next: excitations, simulated, and the one that tells most."""

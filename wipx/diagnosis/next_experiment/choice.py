@@ -1,0 +1,236 @@
+"""The next experiment: the excitation that best settles what the recordings leave open.
+
+Every excitation of a menu is run on the completed model. It separates the completed model from a rival as far as the
+rival, fitted to that run as well as to the recordings so far, still predicts something else (T-optimality: Atkinson,
+Fedorov 1975, The design of experiments for discriminating between two rival models, Biometrika 62(1)); it measures a
+number as well as the information of both says. The run is simulated by `simulated_experiment`.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.diagnosis import Experiment, NextExperiment
+from wipx.diagnosis.likelihood.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.sandwich import covariance, inflation
+from wipx.diagnosis.next_experiment.excitations import Reach, how, menu, prescribed
+from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, Trial, loaded
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import StateFeedback
+
+MOST_RIVALS = 3
+STEPS = 3  # of a rival's fit to a simulated run
+USELESS = 1.0  # standard deviations below which an experiment settles nothing
+DECISIVE = 3.0  # standard deviations that settle a question
+MOST_REPEATS = 20
+UNSEEN = 1.96  # standard deviations; a smaller number may be as large as this without being seen
+
+
+@dataclass(frozen=True)
+class Question:
+    """What the recordings leave open.
+
+    Attributes:
+        sentence: It, for a person.
+        rivals: Other hypotheses that explain the recordings about as well, the closest first.
+        parameters: Numbers of the completed model that are not known well, e.g. "pitch/viscous.sigma".
+    """
+
+    sentence: str
+    rivals: tuple[Fit, ...]
+    parameters: tuple[str, ...]
+
+
+def next_experiment(
+    question: Question,
+    fit: Fit,
+    setting: Setting,
+    log: Log,
+    simulator: AnalyticSimulator,
+    feedback: StateFeedback | None,
+    rate: float,
+    rng: np.random.Generator,
+) -> NextExperiment | None:
+    """The experiment that settles a question best.
+
+    Args:
+        question: What is open.
+        fit: Of the completed model.
+        setting: The robot.
+        log: The recordings so far.
+        simulator: The engine.
+        feedback: The robot's controller; without one, commands are replayed from where the recordings start.
+        rate: Of the controller [Hz].
+        rng: Draws phases and noise.
+
+    Returns:
+        The menu by the separation of what stays least clear, after one run of 10 s. None where nothing is open, the
+        robot cannot be simulated within its reach, or no experiment would settle anything.
+    """
+    reach = Reach.of(log)
+    closed = feedback is not None
+    bench = Bench(simulator, fit.hypothesis, log, reach, fit.levels, feedback, rate)
+    asked = _Asked.of(question, fit, log)
+    trials, separations = [], []
+    for excitation in menu(fit.hypothesis.model, reach, rng, closed=closed):
+        trial = None if excitation.mass and asked.has_payload_event else bench.tried(excitation, rng)
+        if trial is not None:
+            run = Log.of((trial.recording,), log.plant).reporting_nothing(log)
+            fitter = InnovationFitter(Follower.of(simulator, run, setting.nominal))
+            trials.append(trial)
+            separations.append(asked.separations(fitter, trial.excitation.mass))
+    if not trials or not asked.count:
+        return None
+    table = np.array(separations)
+    settled = table.max(axis=0) >= USELESS
+    if not settled.any():
+        return None
+    worst = table[:, settled].min(axis=1)
+    experiments = [
+        _experiment(trial, fit, float(separation), closed=closed, rivals=bool(question.rivals))
+        for trial, separation in zip(trials, worst, strict=True)
+    ]
+    order = np.argsort(-worst, kind="stable")
+    best = int(order[0])
+    reference = prescribed(log.plant, trials[best].excitation, closed=closed)
+    return NextExperiment(question.sentence, experiments[best], tuple(experiments[i] for i in order), reference)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A question, with what the recordings so far say of it.
+
+    Attributes:
+        fit: Of the completed model.
+        rivals: That are looked at.
+        numbers: Indices of the open numbers.
+        known: Covariance of the position in the cube so far, shape (D, D).
+        overstated: Factor by which likelihoods overstate the evidence.
+    """
+
+    fit: Fit
+    rivals: tuple[Fit, ...]
+    numbers: tuple[int, ...]
+    known: np.ndarray
+    overstated: float
+
+    @classmethod
+    def of(cls, question: Question, fit: Fit, log: Log) -> "_Asked":
+        names = fit.hypothesis.space.names
+        numbers = tuple(names.index(name) for name in question.parameters)
+        everything = list(range(len(names)))
+        return cls(fit, question.rivals[:MOST_RIVALS], numbers, covariance(fit), inflation(fit, everything))
+
+    @property
+    def count(self) -> int:
+        """How many things are asked."""
+        return len(self.rivals) + len(self.numbers)
+
+    @property
+    def has_payload_event(self) -> bool:
+        """Whether a known mass cannot be told to the simulator beside what the models have."""
+        return any(EVENT in fit.hypothesis.model.effects for fit in (self.fit, *self.rivals))
+
+    def separations(self, fitter: InnovationFitter, mass: float) -> np.ndarray:
+        """What a simulated run would add, shape (count,) [standard deviations].
+
+        Args:
+            fitter: Of the run.
+            mass: Known mass on the robot [kg].
+        """
+        judge = replace(self.fit, hypothesis=loaded(self.fit.hypothesis, mass))
+        view = _View(fitter, judge)
+        apart = [view.distance(loaded(rival.hypothesis, mass), rival.information) for rival in self.rivals]
+        return np.array([*(np.sqrt(d / self.overstated) for d in apart), *self._precisions(view)])
+
+    def _precisions(self, view: "_View") -> list[float]:
+        """Size over standard deviation of each open number, with the run added."""
+        if not self.numbers:
+            return []
+        hypothesis = view.judge.hypothesis
+        slopes = view.slopes(hypothesis, hypothesis.cube, self.fit.information)
+        known = np.linalg.pinv(self.known) + np.eye(len(hypothesis.cube))  # each is known to lie in the cube
+        total = known + slopes.T @ slopes / self.overstated
+        before, after = (np.sqrt(np.diag(np.linalg.inv(information))) for information in (known, total))
+        found = []
+        for i in self.numbers:
+            value, per_cube = _value_and_slope(hypothesis, i)
+            size = max(abs(value), UNSEEN * per_cube * before[i])
+            found.append(size / (per_cube * after[i]))
+        return found
+
+
+@dataclass(frozen=True)
+class _View:
+    """A simulated run as the completed model's observer sees it.
+
+    Attributes:
+        fitter: Of the run.
+        judge: The completed model with noise and colour of the recordings so far.
+    """
+
+    fitter: InnovationFitter
+    judge: Fit
+
+    def distance(self, rival: Hypothesis, information: np.ndarray) -> float:
+        """Twice the log-likelihood ratio to expect when the rival is fitted to run and recordings [nats].
+
+        The size of the noise is fitted as well, so that the ratio grows with the logarithm of a large difference.
+        """
+        truth = self._white(self.judge.hypothesis, self.judge.hypothesis.cube[None])[0]
+        start = rival.cube
+        cost = float(np.sum((self._white(rival, start[None])[0] - truth) ** 2))
+        cube = start
+        for _ in range(STEPS if len(start) else 0):
+            slopes = self.slopes(rival, cube, information)
+            left = self._white(rival, cube[None])[0] - truth
+            moved = cube - start
+            normal = slopes.T @ slopes + information
+            trials = _steps(cube, normal, slopes.T @ left + information @ moved)
+            costs = np.sum((self._white(rival, trials) - truth) ** 2, axis=1)
+            costs += np.einsum("pi,ij,pj->p", trials - start, information, trials - start)
+            best = int(costs.argmin())
+            if costs[best] >= cost:
+                break
+            cube, cost = trials[best], float(costs[best])
+        log = self.fitter.log
+        values = int(log.counted.sum()) * log.signals
+        return values * float(np.log1p(cost / values))
+
+    def slopes(self, hypothesis: Hypothesis, cube: np.ndarray, information: np.ndarray) -> np.ndarray:
+        """Slopes of the white innovations by the position in the cube, shape (values, D)."""
+        size = np.clip(SECANT / np.sqrt(np.maximum(np.diag(information), 1e-12)), 1e-6, LARGEST_STEP)
+        signed = np.where(cube > 0.5, -size, size)
+        white = self._white(hypothesis, np.concatenate([cube[None], cube + np.diag(signed)]))
+        return ((white[1:] - white[0]) / signed[:, None]).T
+
+    def _white(self, hypothesis: Hypothesis, cubes: np.ndarray) -> np.ndarray:
+        return self.fitter.white_of(self.judge, hypothesis.space.batch(cubes))
+
+
+def _steps(cube: np.ndarray, normal: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Positions to try, one for each damping, within the cube."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    scaled = normal / np.outer(scale, scale)
+    moves = [np.linalg.solve(scaled + (d + 1e-9) * np.eye(len(cube)), slope / scale) / scale for d in DAMPINGS]
+    return np.clip(cube - np.array(moves), 0.0, 1.0)
+
+
+def _experiment(trial: Trial, fit: Fit, separation: float, *, closed: bool, rivals: bool) -> Experiment:
+    sentence = how(trial.excitation, fit.hypothesis.model, trial.command, closed=closed)
+    repeats = int(np.ceil((DECISIVE / max(separation, 1e-6)) ** 2)) if rivals else 1
+    if 1 < repeats <= MOST_REPEATS:
+        sentence += f"; do it {repeats} times"
+    return Experiment(trial.excitation.name, sentence, separation)
+
+
+def _value_and_slope(hypothesis: Hypothesis, index: int) -> tuple[float, float]:
+    """A number and how much it changes along its side of the cube [SI]."""
+    ends = np.repeat(hypothesis.cube[None], 3, axis=0)
+    ends[1:, index] = np.clip(ends[0, index] + np.array([-1e-4, 1e-4]), 0.0, 1.0)
+    values = hypothesis.space.to_values(ends)[:, index]
+    return float(values[0]), float((values[2] - values[1]) / (ends[2, index] - ends[1, index]))

@@ -1,0 +1,118 @@
+"""The diagnosis: nominal model and recordings in, verdict, location, names, numbers and what is open out."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wipx.core.diagnosis import Diagnosis
+from wipx.core.model import Model
+from wipx.core.recording import Recording
+from wipx.diagnosis.answer.answer import answered, proposed
+from wipx.diagnosis.answer.caveats import caveats
+from wipx.diagnosis.answer.suspects import asked, check_suspects
+from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.evidence import found
+from wipx.diagnosis.decision.plausibility import check_plausible
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.selection.search import Selection
+from wipx.identify.parameter_space import scales_of
+from wipx.identify.windows import check_long_enough
+from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.simulator import StateFeedback
+
+SHORTEST_HALVED = 2.0  # [s]
+
+Watcher = Callable[[str, float], None]
+
+
+def in_two(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
+    """Recordings as they are; one alone in two halves, each of which can be held out from the other."""
+    if len(recordings) != 1 or recordings[0].duration < SHORTEST_HALVED:
+        return recordings
+    whole = recordings[0]
+    middle = len(whole) // 2
+    return (
+        replace(whole.rows(0, middle), name=f"{whole.name}, first half"),
+        replace(whole.rows(middle, len(whole)), name=f"{whole.name}, second half"),
+    )
+
+
+def unwatched(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What a diagnosis knows of a robot beforehand.
+
+    Attributes:
+        nominal: What its owner believes.
+        uncertainty: Relative standard deviation of nominal numbers that are not exact.
+        feedback: The controller that closed the loop, and its rate [Hz]; None if unknown.
+    """
+
+    nominal: Model
+    uncertainty: Mapping[str, float]
+    feedback: tuple[StateFeedback, float] | None = None
+
+
+def diagnose(
+    recordings: tuple[Recording, ...],
+    robot: Robot,
+    simulator: AnalyticSimulator,
+    *,
+    title: str = "",
+    source: str = "robot.yaml",
+    rng: np.random.Generator | None = None,
+    watcher: Watcher = unwatched,
+    suspects: Mapping[str, Mapping[str, float]] | None = None,
+) -> Diagnosis:
+    """Find out what physics a nominal model lacks.
+
+    Args:
+        recordings: Of one robot; several with different excitations tell most.
+        robot: The nominal model.
+        simulator: The engine.
+        title: Of the page.
+        source: Where the recordings come from.
+        rng: Draws the excitations of the next experiment; None for always the same.
+        watcher: Told the stage and the share that is done.
+        suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
+            suspected, by symbol [SI], or with none; they do not change the answer.
+
+    Raises:
+        InputError: a recording is too short, a suspect cannot be, or the recordings contradict the nominal model
+            grossly.
+    """
+    begun = time.perf_counter()
+    check_long_enough(recordings)
+    halves = in_two(recordings)
+    setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
+    suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
+    inquiry = Inquiry.of(halves, setting, simulator)
+    watcher("noise of the nominal model", 0.02)
+    fitter = inquiry.by_row
+    nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), inquiry.first_levels))
+    selection = Selection(fitter, setting, nominal, inquiry.transfers)
+    watcher("looking for missing effects", 0.1)
+    first = selection.extensions(nominal)
+    if inquiry.is_driven:
+        check_plausible(fitter, setting, selection.nominal, first[0] if first else nominal, source)
+    watcher("looking for combinations", 0.3)
+    chosen = selection.run()
+    watcher("what is left over", 0.5)
+    end = found(inquiry, selection, chosen)
+    inquiry, selection, rest = end.inquiry, end.selection, end.rest
+    watcher("held-out recordings", 0.75)
+    answer = answered(inquiry, selection, rest, end.shapes)
+    watcher("next experiment", 0.9)
+    proposal = proposed(inquiry, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    answer = replace(answer, next_experiment=proposal)
+    if suspected:
+        watcher("suspects", 0.95)
+        answer = replace(answer, suspects=asked(inquiry, selection, rest, answer, suspected))
+    watcher("done", 1.0)
+    seconds = time.perf_counter() - begun
+    return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)

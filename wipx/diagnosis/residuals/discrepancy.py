@@ -1,0 +1,115 @@
+"""What stands in for physics that has no name: a law beyond the vocabulary, or a force that is only a curve.
+
+The curve is the mean of a Gaussian process over one signal (Rasmussen, Williams 2006, ch. 2), given the
+white innovations linearised in the force; size and smoothness maximise the marginal likelihood.
+"""
+
+import numpy as np
+from scipy.optimize import minimize
+
+from wipx.core.diagnosis import Curve
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.residuals.residual_tests import Leftover, Shape, leftovers
+from wipx.effects.remainder import COMMANDS, KNOTS, TIME
+from wipx.sim.coefficients import joint_index
+
+ROUNDS = 3  # of linearising anew
+NUGGET = 1e-8
+FACTORS = {"force": 0.0, "gain": 1.0, "friction": -1.0}  # of the effect `remainder`, by kind of shape
+
+
+def process_mean(slopes: np.ndarray, white: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation of the force at the knots, shape (KNOTS,) each.
+
+    Args:
+        slopes: Of the white innovations by the force at each knot, shape (N, KNOTS).
+        white: White innovations, shape (N,).
+        knots: Shape (KNOTS,).
+    """
+    normal, score = slopes.T @ slopes, slopes.T @ white
+    plain = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)
+    size = float(np.sqrt(np.mean((plain @ score) ** 2))) + 1e-12
+    distance = (knots[:, None] - knots[None, :]) / (knots[-1] - knots[0])
+
+    def prior(logarithms: np.ndarray) -> np.ndarray:
+        deviation, reach = np.exp(logarithms)
+        return deviation**2 * (np.exp(-0.5 * (distance / reach) ** 2) + NUGGET * np.eye(len(knots)))
+
+    def negative_evidence(logarithms: np.ndarray) -> float:
+        inner = np.eye(len(knots)) + normal @ prior(logarithms)
+        sign, determinant = np.linalg.slogdet(inner)
+        gain = 0.5 * score @ prior(logarithms) @ np.linalg.solve(inner, score)
+        return float(0.5 * determinant - gain) if sign > 0 else np.inf
+
+    start = np.log([size, 0.3])
+    bounds = [(start[0] - 4.0, start[0] + 4.0), (np.log(0.08), np.log(3.0))]
+    best = minimize(negative_evidence, start, method="Nelder-Mead", bounds=bounds, options={"maxiter": 120}).x
+    covariance = prior(best) @ np.linalg.inv(np.eye(len(knots)) + normal @ prior(best))
+    return -covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, leftover: Leftover) -> tuple[Fit, np.ndarray]:
+    """A fit with a force over one signal added, refined, and the force's standard deviation at the knots."""
+    shape = leftover.shape
+    name = f"{fitter.log.plant.joints[shape.joint]}/remainder"
+    force = np.zeros(KNOTS)
+    log = fitter.log
+    current = fitter.fit(with_force(setting, fit, name, shape, force, log), fit.levels, steps=0)
+    spread = np.zeros(KNOTS)
+    for _ in range(ROUNDS):
+        again = leftovers(fitter, current, [shape])[0]
+        change, spread = process_mean(again.slopes, current.white.ravel(), shape.knots)
+        force = force + change
+        found = fitter.fit(with_force(setting, fit, name, shape, force, log), current.levels, steps=3)
+        if found.log_likelihood < current.log_likelihood + 0.5:
+            break
+        current = found
+    return fitter.polished(current, rounds=2), spread
+
+
+def with_force(setting: Setting, fit: Fit, name: str, shape: Shape, force: np.ndarray, log: Log) -> Hypothesis:
+    """The hypothesis of a fit, on a nominal model that has the force."""
+    values = {
+        "signal": float(_code(shape, log)),
+        "factor": FACTORS[shape.kind],
+        "low": float(shape.knots[0]),
+        "high": float(shape.knots[-1]),
+        **{f"f{i}": float(f) for i, f in enumerate(force)},
+    }
+    richer = Setting(setting.nominal.with_effects({name: values}), setting.uncertainty, setting.scales)
+    return Hypothesis.of(richer, fit.effects, fit.hypothesis.values)
+
+
+def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, log: Log) -> Curve:
+    """The force as a person reads it."""
+    plant = log.plant
+    site = plant.joints[shape.joint]
+    values = fit.hypothesis.model.effects[f"{site}/remainder"]
+    force = np.array([values[f"f{i}"] for i in range(KNOTS)])
+    unit = "share of u" if shape.kind == "gain" else "N m" if plant.is_angular(site) else "N"
+    words = {"gain": "change of the actuator gain", "friction": "change of dry friction", "force": "unknown force"}
+    return Curve(
+        f"{words[shape.kind]} on {site}",
+        shape.signal,
+        "s" if shape.signal == "t" else plant.unit_of(shape.signal),
+        unit,
+        shape.knots,
+        force,
+        shape.knots,
+        force,
+        spread,
+    )
+
+
+def _code(shape: Shape, log: Log) -> int:
+    plant = log.plant
+    if shape.signal in plant.coordinates:
+        return joint_index(plant.joints[plant.coordinates.index(shape.signal)])
+    if shape.signal in plant.rates:
+        return 2 + joint_index(plant.joints[plant.rates.index(shape.signal)])
+    if shape.signal in plant.commands:
+        return COMMANDS[joint_index(plant.actuated[plant.commands.index(shape.signal)])]
+    return TIME

@@ -1,0 +1,1 @@
+"""Which effects are missing together: the search, and laws that contain each other."""

@@ -1,0 +1,142 @@
+"""Laws that contain simpler ones: when a rich law was fitted but only its simple part is needed."""
+
+import numpy as np
+
+from wipx.core.plant import Plant
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.sandwich import covariance
+from wipx.effects.catalogue import effect_of, vocabulary
+from wipx.identify.noise import quantisation, sensor_noise
+
+CONTAINS = {  # rich law: the simple one that it can always imitate
+    "stribeck": "coulomb",
+    "presliding": "coulomb",
+    "sticky_spot": "coulomb",
+    "speed_limit": "saturation",
+    "payload_event": "payload",
+}
+# What an effect is whose memory is never tried: a bristle that does not slip is a spring, with its damping.
+PARTS = {"translation/presliding": {"environment/spring.k": "stiffness", "translation/viscous.sigma": "damping"}}
+CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer one from beyond it
+SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
+SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
+INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
+HARDLY = 0.1  # of a joint's travel, bent by which a bristle hardly slips
+BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
+CERTAIN = 2.0  # standard deviations
+ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
+
+
+def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
+    """The effects of a fit with one law replaced by the simpler one that it amounts to; None where it does not."""
+    for effect in fit.effects:
+        kind = _amounts_to(effect, fit, log)
+        if kind is not None:
+            other = f"{effect.partition('/')[0]}/{kind}"
+            rest = tuple(other if e == effect else e for e in fit.effects)
+            if len(set(rest)) == len(rest):
+                return rest
+    return None
+
+
+def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None:
+    """The simple law that an effect contains; None where it contains none, or none that may stand beside the others."""
+    site, _, kind = effect.partition("/")
+    simple = f"{site}/{CONTAINS[kind]}" if kind in CONTAINS else None
+    here = [e for e in beside if e.startswith(f"{site}/")]
+    excluded = simple in beside or any(CONTAINS.get(kind) in effect_of(e, plant).excludes for e in here)
+    return None if excluded else simple
+
+
+def parted(fit: Fit, log: Log) -> tuple[str, ...] | None:
+    """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
+    plant = fit.hypothesis.model.plant
+    for effect in fit.effects:
+        parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
+        rest = tuple(e for e in fit.effects if e != effect and e not in parts)
+        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, log):
+            return (*rest, *parts)
+    return None
+
+
+def _hardly_slips(effect: str, fit: Fit, log: Log) -> bool:
+    """Whether a bristle bends by a good part of what its joint travels before it slips."""
+    value = fit.hypothesis.values
+    travel = float(np.ptp(log.measured[:, log.plant.joints.index(effect.partition("/")[0])][log.rows]))
+    return value[f"{effect}.F_c"] > HARDLY * travel * value[f"{effect}.stiffness"]
+
+
+def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
+    """The effects of a fit with a law from beyond the vocabulary, the last, in the place of one that it contains.
+
+    With values to start from; None where no such law is known.
+    """
+    site, _, kind = effect.partition("/")
+    if kind not in CONTAINED_IN:
+        return None
+    law = f"{site}/{CONTAINED_IN[kind]}"
+    values = fit.hypothesis.values
+    kept = {name.replace(effect, law): value for name, value in values.items() if name.startswith(f"{effect}.")}
+    starts = [{**values, **kept, **{f"{law}.{symbol}": value for symbol, value in shape.items()}} for shape in SHAPES]
+    return (*(e for e in fit.effects if e != effect), law), starts
+
+
+def simple_values(fit: Fit) -> dict[str, float]:
+    """Numbers of the fit's rich laws as those of the simple ones that they contain."""
+    found = {}
+    for name, value in fit.hypothesis.values.items():
+        effect, _, symbol = name.rpartition(".")
+        site, _, kind = effect.partition("/")
+        if kind in CONTAINS:
+            found[f"{site}/{CONTAINS[kind]}.{SYMBOLS.get(symbol, symbol)}"] = value
+    for effect, parts in PARTS.items():
+        if effect in fit.effects:
+            found.update({name: fit.hypothesis.values[f"{effect}.{symbol}"] for name, symbol in parts.items()})
+    return found
+
+
+def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:
+    site, _, kind = effect.partition("/")
+    value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
+    if kind == "presliding":
+        visible = INVISIBLE * _resolution(site, log)
+        return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
+    if kind == "stribeck":
+        return "coulomb" if not _peak_is_certain(effect, fit, log) else None
+    if kind == "speed_limit":
+        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(log) else None
+    if kind == "payload_event":
+        return "payload" if value["t0"] <= float(log.inputs.t[0].max()) + 0.15 else None
+    if kind == "sticky_spot":
+        travel = log.measured[:, 0][log.rows]
+        inside = np.mean((travel >= value["lo"]) & (travel <= value["hi"]))
+        return "coulomb" if inside > ALL_OVER else None
+    return None
+
+
+def _resolution(site: str, log: Log) -> float:
+    joint = log.plant.joints.index(site)
+    series = [r[log.plant.coordinates[joint]] for r in log.recordings]
+    return max(quantisation(series), float(sensor_noise(log.recordings, log.plant)[joint]))
+
+
+def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
+    """Whether static and Coulomb level differ by more than chance."""
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    static, level = space.names.index(f"{effect}.F_s"), space.names.index(f"{effect}.F_c")
+    size = np.array([p.high - p.low for p in space.free])
+    slope = np.zeros(len(cube))
+    slope[[static, level]] = size[static], -size[level]
+    peak = float(slope @ cube)
+    return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit) @ slope))
+
+
+def _top_speed(log: Log) -> float:
+    joint = log.plant.joints.index(log.plant.actuated[0])
+    speeds = []
+    for r in log.recordings:
+        q = r[log.plant.coordinates[joint]]
+        step = max(1, min(round(0.05 * r.rate), len(q) - 1))
+        speeds.append(np.abs((q[step:] - q[:-step]) / (r.t[step:] - r.t[:-step])).max())
+    return float(max(speeds))
