@@ -24,7 +24,7 @@ from wipx.concealed.dirty_score import alike
 from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.decision.context import HORIZON, Inquiry
+from wipx.diagnosis.decision.context import HORIZON, Context
 from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import HORIZONS, ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
@@ -80,11 +80,11 @@ class Case:
     plausible: tuple[str, ...] = ()
 
     @property
-    def inquiry(self) -> Inquiry:
+    def context(self) -> Context:
         """The means of a diagnosis."""
         halves = in_two(self.seen)
         setting = Setting(self.nominal, self.uncertainty, scales_of(self.nominal, halves))
-        return Inquiry.of(halves, setting, AnalyticSimulator(threads=1))
+        return Context.of(halves, setting, AnalyticSimulator(threads=1))
 
     def error(self, model: Model) -> float:
         """Root mean square error over half a second on what was not seen, over the nominal model's."""
@@ -94,20 +94,20 @@ class Case:
         return float(np.sqrt(np.mean([(errors.completed[n] / errors.nominal[n]) ** 2 for n in errors.nominal])))
 
 
-def by_forecasts(kind: type[ForecastFitter], inquiry: Inquiry, setting: Setting) -> ForecastFitter:
+def by_forecasts(kind: type[ForecastFitter], context: Context, setting: Setting) -> ForecastFitter:
     """Forecasts beside the noise that innovations find for the nominal model."""
-    by_row = inquiry.by_row
-    seen = by_row.polished(by_row.fit(Hypothesis.of(inquiry.setting, (), {}), inquiry.first_levels))
-    return kind(by_row, inquiry.first_levels, seen.levels, setting)
+    by_row = context.by_row
+    seen = by_row.polished(by_row.fit(Hypothesis.of(context.setting, (), {}), context.first_levels))
+    return kind(by_row, context.first_levels, seen.levels, setting)
 
 
-def ahead(kind: type[ForecastFitter], *, doubted: bool) -> Callable[[Inquiry], Fitter]:
+def ahead(kind: type[ForecastFitter], *, doubted: bool) -> Callable[[Context], Fitter]:
     """A criterion of forecasts, with the owner's exact numbers in doubt or not."""
     return lambda i: by_forecasts(kind, i, i.setting.doubted() if doubted else i.setting)
 
 
-CRITERIA: Mapping[str, Callable[[Inquiry], Fitter]] = {
-    "one row ahead": lambda inquiry: inquiry.by_row,
+CRITERIA: Mapping[str, Callable[[Context], Fitter]] = {
+    "one row ahead": lambda context: context.by_row,
     "half a second ahead, held out, numbers in doubt": ahead(HalfSecond, doubted=True),
     "four horizons, not held out": ahead(NotHeldOut, doubted=False),
     "four horizons, held out": ahead(ForecastFitter, doubted=False),
@@ -145,34 +145,34 @@ def rigs() -> Iterator[Case]:
         yield Case(str(name), robot.model, robot.uncertainty, split.fit, split.held_out, missing, plausible)
 
 
-def searched(inquiry: Inquiry, fitter: Fitter) -> tuple[str, ...]:
+def searched(context: Context, fitter: Fitter) -> tuple[str, ...]:
     """Effects that a search by one criterion ends with."""
-    start = Hypothesis.of(inquiry.setting, (), {})
+    start = Hypothesis.of(context.setting, (), {})
     if isinstance(fitter, ForecastFitter):
         nominal = fitter.begun(start)
     else:
-        nominal = fitter.polished(fitter.fit(start, inquiry.first_levels))
-    return Selection(fitter, inquiry.setting, nominal).run().effects
+        nominal = fitter.polished(fitter.fit(start, context.first_levels))
+    return Selection(fitter, context.setting, nominal).run().effects
 
 
-def refitted(inquiry: Inquiry, effects: tuple[str, ...]) -> Model:
+def refitted(context: Context, effects: tuple[str, ...]) -> Model:
     """The nominal model with effects, fitted to forecasts from where screening has the best of each in turn."""
-    fitter = by_forecasts(ForecastFitter, inquiry, inquiry.setting)
-    fit = fitter.begun(Hypothesis.of(inquiry.setting, (), {}))
-    search = Selection(fitter, inquiry.setting, fit)
+    fitter = by_forecasts(ForecastFitter, context, context.setting)
+    fit = fitter.begun(Hypothesis.of(context.setting, (), {}))
+    search = Selection(fitter, context.setting, fit)
     for effect in effects:
-        starts = [each for each in search.prospects_of(fit) if each.effect == effect]
+        starts = [each for each in search.candidates_for(fit) if each.effect == effect]
         values = {**fit.hypothesis.values, **(starts[0].values if starts else {})}
-        begun = Hypothesis.of(inquiry.setting, (*fit.effects, effect), values)
+        begun = Hypothesis.of(context.setting, (*fit.effects, effect), values)
         fit = fitter.polished(fitter.fit(begun, fit.levels))
     return fit.hypothesis.model
 
 
-def judged(case: Case, inquiry: Inquiry, criterion: str, reference: float) -> dict[str, Any]:
+def judged(case: Case, context: Context, criterion: str, reference: float) -> dict[str, Any]:
     """What one criterion makes of a robot."""
     begun = time.process_time()
     try:
-        effects = searched(inquiry, CRITERIA[criterion](inquiry))
+        effects = searched(context, CRITERIA[criterion](context))
     except np.linalg.LinAlgError:
         effects = ()
     seconds = time.process_time() - begun
@@ -186,7 +186,7 @@ def judged(case: Case, inquiry: Inquiry, criterion: str, reference: float) -> di
         if name not in named and other is not None:
             left.remove(other)
             kin += 1
-    error = case.error(refitted(inquiry, effects)) if effects else 1.0
+    error = case.error(refitted(context, effects)) if effects else 1.0
     return {
         "case": case.name,
         "criterion": criterion,
@@ -246,10 +246,10 @@ def main() -> None:
         left = [criterion for criterion in CRITERIA if (case.name, criterion) not in done]
         if not left:
             continue
-        inquiry = case.inquiry
-        reference = case.error(refitted(inquiry, tuple(case.missing))) if case.missing else 1.0
+        context = case.context
+        reference = case.error(refitted(context, tuple(case.missing))) if case.missing else 1.0
         for criterion in left:
-            result = judged(case, inquiry, criterion, reference)
+            result = judged(case, context, criterion, reference)
             results.append(result)
             with kept.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(result) + "\n")

@@ -13,10 +13,10 @@ from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
-from wipx.diagnosis.likelihood.noise_model import colour_of
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
+from wipx.diagnosis.likelihood.noise_model import noise_model_of
 from wipx.diagnosis.likelihood.observer import NoiseLevels, observer_gains
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.pipeline import Robot, diagnose
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
@@ -35,20 +35,20 @@ def measure_diagnosis() -> dict[str, float]:
     nominal = Model(plant, plant.complete(BODY, "benchmark"), {})
     recordings = _record(nominal.with_effects(MISSING), nominal, np.random.default_rng(1))
     simulator = AnalyticSimulator(threads=1)
-    log = Log.of(recordings, plant)
-    fitter = InnovationFitter(Follower.of(simulator, log, nominal))
+    data = RecordingBatch.of(recordings, plant)
+    fitter = InnovationFitter(InnovationsModel.of(simulator, data, nominal))
     hypothesis = Hypothesis.of(Setting(nominal, {}, scales_of(nominal, recordings)), (), {})
     forces = 0.01 * np.exp(np.linspace(-2.0, 2.0, LEVELS))
     levels = [NoiseLevels(np.full(2, force), np.array(list(NOISE.values()))) for force in forces]
-    gains = observer_gains(fitter.follower.linear, log, levels)
+    gains = observer_gains(fitter.innovations_model.linear, data, levels)
     batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], LEVELS, axis=0))
     follow = (batch, gains, np.arange(LEVELS), np.zeros(LEVELS))
-    innovations = fitter.follower.innovations(*follow)
+    innovations = fitter.innovations_model.innovations(*follow)
     parts = interleaved(
         {
-            "gains": lambda: observer_gains(fitter.follower.linear, log, levels),
-            "simulation, innovations": lambda: fitter.follower.innovations(*follow),
-            "colours": lambda: [colour_of(each, log) for each in innovations],
+            "gains": lambda: observer_gains(fitter.innovations_model.linear, data, levels),
+            "simulation, innovations": lambda: fitter.innovations_model.innovations(*follow),
+            "colours": lambda: [noise_model_of(each, data) for each in innovations],
         },
         ROUNDS,
     )

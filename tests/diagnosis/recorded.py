@@ -15,9 +15,9 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.pipeline import Robot as KnownRobot
 from wipx.diagnosis.pipeline import diagnose
 from wipx.identify.noise import sensor_noise
@@ -47,12 +47,12 @@ class Bench:
         return Setting(self.nominal, self.uncertainty, scales_of(self.nominal, self.recordings))
 
     @cached_property
-    def log(self) -> Log:
-        return Log.of(self.recordings, self.nominal.plant)
+    def data(self) -> RecordingBatch:
+        return RecordingBatch.of(self.recordings, self.nominal.plant)
 
     @cached_property
     def fitter(self) -> InnovationFitter:
-        return InnovationFitter(Follower.of(SIMULATOR, self.log, self.nominal))
+        return InnovationFitter(InnovationsModel.of(SIMULATOR, self.data, self.nominal))
 
     @cached_property
     def quiet(self) -> NoiseLevels:

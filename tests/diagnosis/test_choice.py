@@ -13,11 +13,11 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
-from wipx.diagnosis.next_experiment.excitations import DURATION, Reach, menu
+from wipx.diagnosis.next_experiment.excitations import DURATION, Reach, excitations_for
 from wipx.diagnosis.next_experiment.simulated_experiment import FURTHER, STRONGER, Bench
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
@@ -34,12 +34,12 @@ class Case:
         self.robot = Robot(self.nominal.with_effects(effects))
         self.recordings = self.robot.record(np.random.default_rng(seed))
         self.setting = Setting(self.nominal, {}, scales_of(self.nominal, self.recordings))
-        self.log = Log.of(self.recordings, self.nominal.plant)
-        self.fitter = self.fitter_of(self.log)
+        self.data = RecordingBatch.of(self.recordings, self.nominal.plant)
+        self.fitter = self.fitter_of(self.data)
         self.fit = self.fitted(tuple(effects))
 
-    def fitter_of(self, log: Log) -> InnovationFitter:
-        return InnovationFitter(Follower.of(SIMULATOR, log, self.nominal))
+    def fitter_of(self, data: RecordingBatch) -> InnovationFitter:
+        return InnovationFitter(InnovationsModel.of(SIMULATOR, data, self.nominal))
 
     def fitted(self, effects: tuple[str, ...]) -> Fit:
         force = np.array([1e-4 * self.setting.scales[site].force for site in self.nominal.plant.joints])
@@ -50,7 +50,7 @@ class Case:
         feedback = controller(self.nominal.plant.kind) if closed else None
         question = Question("Which is it?", rivals, parameters)
         rng = np.random.default_rng(1)
-        return next_experiment(question, self.fit, self.setting, self.log, SIMULATOR, feedback, RATE, rng)
+        return next_experiment(question, self.fit, self.setting, self.data, SIMULATOR, feedback, RATE, rng)
 
 
 @cache
@@ -94,9 +94,9 @@ def test_predicted_separation_is_met_by_the_recording(fresh_seed: int):
     case = slow_actuator()
     rng = np.random.default_rng(fresh_seed)
     bench = Bench(
-        SIMULATOR, case.fit.hypothesis, case.log, Reach.of(case.log), case.fit.levels, controller("wip"), RATE
+        SIMULATOR, case.fit.hypothesis, case.data, Reach.of(case.data), case.fit.levels, controller("wip"), RATE
     )
-    chirp = next(e for e in menu(case.nominal, bench.reach, rng, closed=True) if e.name == "chirp")
+    chirp = next(e for e in excitations_for(case.nominal, bench.reach, rng, closed=True) if e.name == "chirp")
     trial = bench.tried(chirp, rng)
     assert trial is not None
     predicted = next(e.separation for e in late_or_lagging().menu if e.name == "chirp")
@@ -106,7 +106,7 @@ def test_predicted_separation_is_met_by_the_recording(fresh_seed: int):
 
 def separation_of(case: Case, recording: Recording, rival: Fit) -> float:
     """Of the completed model from a rival, both fitted to one recording."""
-    fitter = case.fitter_of(Log.of((recording,), case.nominal.plant))
+    fitter = case.fitter_of(RecordingBatch.of((recording,), case.nominal.plant))
     right, wrong = (fitter.fit(f.hypothesis, case.fit.levels) for f in (case.fit, rival))
     return float(np.sqrt(2.0 * max(right.log_likelihood - wrong.log_likelihood, 0.0)))
 
@@ -157,10 +157,12 @@ def test_an_upright_pendulum_is_not_let_go():
 @pytest.mark.parametrize("kind", ["wip", "linear_axis"])
 def test_experiments_stay_within_reach(kind: str, fresh_seed: int):
     case = Case(kind, {"translation/coulomb": {"F_c": 1.0}})
-    reach = Reach.of(case.log)
-    bench = Bench(SIMULATOR, case.fit.hypothesis, case.log, reach, case.fit.levels, controller(kind), RATE)
+    reach = Reach.of(case.data)
+    bench = Bench(SIMULATOR, case.fit.hypothesis, case.data, reach, case.fit.levels, controller(kind), RATE)
     rng = np.random.default_rng(fresh_seed)
-    tried = [bench.tried(replace(e, size=8.0 * e.size), rng) for e in menu(case.nominal, reach, rng, closed=True)]
+    tried = [
+        bench.tried(replace(e, size=8.0 * e.size), rng) for e in excitations_for(case.nominal, reach, rng, closed=True)
+    ]
     trials = [trial for trial in tried if trial is not None]
     assert trials
     for trial in trials:
@@ -171,11 +173,11 @@ def test_experiments_stay_within_reach(kind: str, fresh_seed: int):
 
 def test_steps_take_the_command_where_it_is_aimed():
     case = slow_actuator()
-    recorded = Reach.of(case.log)
+    recorded = Reach.of(case.data)
     reach = replace(recorded, travel=10.0 * recorded.travel)
-    bench = Bench(SIMULATOR, case.fit.hypothesis, case.log, reach, case.fit.levels, controller("wip"), RATE)
+    bench = Bench(SIMULATOR, case.fit.hypothesis, case.data, reach, case.fit.levels, controller("wip"), RATE)
     rng = np.random.default_rng(0)
-    steps = next(e for e in menu(case.nominal, reach, rng, closed=True) if e.name == "steps")
+    steps = next(e for e in excitations_for(case.nominal, reach, rng, closed=True) if e.name == "steps")
     trial = bench.tried(steps, rng)
     assert trial is not None
     assert trial.command == pytest.approx(0.9 * reach.command, rel=0.1)  # the loop is linear but for its noise

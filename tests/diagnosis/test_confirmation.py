@@ -6,12 +6,12 @@ from diagnosis.recorded import Bench, bench, slow
 
 from wipx.core.plant import plant_of
 from wipx.diagnosis.decision import confirmation, estimates
-from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.residuals.residual_tests import Leftover, Shape
-from wipx.diagnosis.selection.nested_laws import simple_law
+from wipx.diagnosis.residuals.residual_tests import Residual, Shape
+from wipx.diagnosis.selection.nested_laws import reduced_law
 from wipx.diagnosis.selection.search import Selection
 
 WIP = plant_of("wip")
@@ -36,9 +36,9 @@ def test_a_size_that_the_step_of_the_simulation_moves_is_not_named(monkeypatch: 
 def test_means_of_commands_may_feign_what_swings(
     averaged: bool, verdict: str, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
 ):
-    def seeming(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+    def seeming(fitter: Fitter, fit: Fit, shapes: list[Shape]) -> list[Residual]:
         shape = next(shape for shape in shapes if shape.kind == "resonance")
-        return [Leftover(shape, 100.0, 1e-12, np.zeros((fit.white.size, 2)))]
+        return [Residual(shape, 100.0, 1e-12, np.zeros((fit.white.size, 2)))]
 
     monkeypatch.setattr(confirmation, "leftovers", seeming)
     robot = bench("linear_axis", {}, fresh_seed)
@@ -48,18 +48,18 @@ def test_means_of_commands_may_feign_what_swings(
 
 
 def test_a_rich_law_has_a_simple_one_where_there_is_room():
-    assert simple_law("pitch/presliding", (), WIP) == "pitch/coulomb"
-    assert simple_law("pitch/presliding", ("translation/coulomb",), WIP) == "pitch/coulomb"
-    assert simple_law("pitch/presliding", ("pitch/coulomb",), WIP) is None
-    assert simple_law("pitch/sticky_spot", ("pitch/stribeck",), WIP) is None  # which excludes Coulomb friction
-    assert simple_law("pitch/viscous", (), WIP) is None
+    assert reduced_law("pitch/presliding", (), WIP) == "pitch/coulomb"
+    assert reduced_law("pitch/presliding", ("translation/coulomb",), WIP) == "pitch/coulomb"
+    assert reduced_law("pitch/presliding", ("pitch/coulomb",), WIP) is None
+    assert reduced_law("pitch/sticky_spot", ("pitch/stribeck",), WIP) is None  # which excludes Coulomb friction
+    assert reduced_law("pitch/viscous", (), WIP) is None
 
 
 @pytest.mark.slow
 def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
     robot = bench("linear_axis", hidden, fresh_seed)
-    monkeypatch.setattr(Inquiry, "heldout_gain", lambda self, repeated, reduced: 0.0)  # nothing shows
+    monkeypatch.setattr(Context, "heldout_gain", lambda self, repeated, reduced: 0.0)  # nothing shows
     answer = robot.diagnosed()
     assert {effect.name for effect in answer.effects} == set(hidden)
     assert answer.verdict == "mismatch"

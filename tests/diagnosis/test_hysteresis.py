@@ -12,7 +12,7 @@ def test_hysteresis_is_not_taken_for_bristles(fresh_seed: int):
     answer = bench("linear_axis", hidden, fresh_seed).diagnosed()
     (effect,) = answer.effects
     assert answer.verdict == "unexplained"
-    assert (effect.name, effect.beyond) == ("translation/hysteresis", True)
+    assert (effect.name, effect.outside_vocabulary) == ("translation/hysteresis", True)
     assert answer.unexplained.resembles == ("translation/hysteresis",)
     assert answer.unexplained.p_value < 1e-4
     assert answer.model.value("translation/hysteresis.F_c") == pytest.approx(0.8, rel=0.05)

@@ -52,7 +52,7 @@ def test_the_excess_adds_up_to_the_gain_in_squared_innovations():
     excess = excess_of(case.fitter, nominal, completed)
     white = case.fitter.white_of(nominal, ModelBatch(completed.hypothesis.model))
     assert excess.sum() == pytest.approx(0.5 * (np.sum(nominal.white**2) - np.sum(white**2)))
-    assert np.all(excess[~case.log.counted] == 0.0)
+    assert np.all(excess[~case.data.counted] == 0.0)
 
 
 @pytest.mark.slow

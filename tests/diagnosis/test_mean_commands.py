@@ -9,7 +9,7 @@ from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.candidates.screening import prospects_of_effect
+from wipx.diagnosis.candidates.screening import candidates_of_effect
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.sim.inputs import Inputs
 
@@ -48,7 +48,7 @@ def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, f
     for name, value in truth.items():
         assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.08)
     # Three commands a row: their spread about the mean is known from how the means scatter.
-    assert case.log.command_spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
+    assert case.data.command_spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
     assert 0.6 < fit.levels.spread < 1.6
     single = case.fitter.fit(fit.hypothesis, replace(fit.levels, spread=1e-9))
     assert fit.log_likelihood > single.log_likelihood + 50.0
@@ -58,7 +58,7 @@ def test_a_dead_zone_is_looked_for_with_commands_that_scatter(fresh_seed: int):
     nominal = nominal_model("linear_axis").with_effects({"environment/spring": SPRING})
     case = Bench(nominal, noisily_driven("actuator/dead_zone", fresh_seed), {})
     fit = case.fitter.polished(case.fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet))
-    starts = prospects_of_effect(case.fitter, case.setting, fit, "actuator/dead_zone")
+    starts = candidates_of_effect(case.fitter, case.setting, fit, "actuator/dead_zone")
     best = max(starts, key=lambda start: start.gain)
     # Taken for the commands themselves, their means would give little more than half of it.
     assert best.values["actuator/dead_zone.band"] == pytest.approx(0.8, rel=0.25)

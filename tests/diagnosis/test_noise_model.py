@@ -6,18 +6,18 @@ from scipy.signal import lfilter
 
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
-from wipx.diagnosis.likelihood.noise_model import LAGS, SURPRISES, colour_of, lagged_products, whitened
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.noise_model import LAGS, SURPRISES, lagged_products, noise_model_of, whitened
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 
 ROWS = 6000
 AR2 = (1.2, -0.5)  # z[k] = 1.2 z[k-1] - 0.5 z[k-2] + e[k]
 
 
-def empty_log(recordings: int = 1, rows: int = ROWS) -> Log:
+def empty_log(recordings: int = 1, rows: int = ROWS) -> RecordingBatch:
     """A log whose rows alone matter."""
     t = 0.01 * np.arange(rows)
     zeros = {"t": t, "x": np.zeros(rows), "u": np.zeros(rows)}
-    return Log.of(tuple(Recording(f"r{r}", zeros) for r in range(recordings)), plant_of("linear_axis"))
+    return RecordingBatch.of(tuple(Recording(f"r{r}", zeros) for r in range(recordings)), plant_of("linear_axis"))
 
 
 def autoregression(rng: np.random.Generator, recordings: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -26,64 +26,69 @@ def autoregression(rng: np.random.Generator, recordings: int = 1) -> tuple[np.nd
     return np.asarray(lfilter([1.0], [1.0, -AR2[0], -AR2[1]], kicks)), kicks
 
 
-def counted(white: np.ndarray, log: Log) -> np.ndarray:
-    return white[0, 0, 0, log.counted[:, 0]]
+def counted(white: np.ndarray, data: RecordingBatch) -> np.ndarray:
+    return white[0, 0, 0, data.counted[:, 0]]
 
 
 def test_an_autoregression_becomes_white(fresh_seed: int):
-    log = empty_log()
+    data = empty_log()
     series, kicks = autoregression(np.random.default_rng(fresh_seed))
-    colour = colour_of(series, log)
-    white = counted(whitened(series[None], colour, log), log)[LAGS[-1] :]
+    noise_model = noise_model_of(series, data)
+    white = counted(whitened(series[None], noise_model, data), data)[LAGS[-1] :]
     assert np.var(white) == pytest.approx(1.0, abs=0.02)
     for lag in (1, 2, 3, 7):
         assert abs(np.mean(white[lag:] * white[:-lag])) < 4.5 / np.sqrt(len(white))
-    driving = kicks[0, 0, log.counted[:, 0]][LAGS[-1] :]
+    driving = kicks[0, 0, data.counted[:, 0]][LAGS[-1] :]
     assert np.corrcoef(white, driving)[0, 1] > 0.99
     # Standard error of a coefficient: below 0.02 with 6000 rows.
-    np.testing.assert_allclose(colour.weights[:2, 0], AR2, atol=0.1)
+    np.testing.assert_allclose(noise_model.weights[:2, 0], AR2, atol=0.1)
 
 
 def test_white_noise_stays_as_it_is(fresh_seed: int):
-    log = empty_log()
+    data = empty_log()
     kicks = np.random.default_rng(fresh_seed).normal(size=(1, 1, ROWS))
-    colour = colour_of(kicks, log)
-    np.testing.assert_allclose(colour.weights, 0.0, atol=5.0 / np.sqrt(ROWS))
-    assert np.corrcoef(counted(whitened(kicks[None], colour, log), log), kicks[0, 0, log.counted[:, 0]])[0, 1] > 0.99
+    noise_model = noise_model_of(kicks, data)
+    np.testing.assert_allclose(noise_model.weights, 0.0, atol=5.0 / np.sqrt(ROWS))
+    assert (
+        np.corrcoef(counted(whitened(kicks[None], noise_model, data), data), kicks[0, 0, data.counted[:, 0]])[0, 1]
+        > 0.99
+    )
 
 
 def test_likelihood_ratio_is_that_of_gaussian_processes(fresh_seed: int):
-    log = empty_log()
+    data = empty_log()
     series, kicks = autoregression(np.random.default_rng(fresh_seed))
-    n = int(log.counted.sum())
+    n = int(data.counted.sum())
     # An autoregression and what drives it have the same density: the map between them has determinant one. Each
     # fits ten weights, worth 5 +- 2 nats; the rows before the first one that counts are worth a few more.
-    assert colour_of(series, log).log_likelihood == pytest.approx(colour_of(kicks, log).log_likelihood, abs=20.0)
+    assert noise_model_of(series, data).log_likelihood == pytest.approx(
+        noise_model_of(kicks, data).log_likelihood, abs=20.0
+    )
     # Half as large noise is likelier by log 2 a row, exactly.
-    ratio = colour_of(0.5 * kicks, log).log_likelihood - colour_of(kicks, log).log_likelihood
+    ratio = noise_model_of(0.5 * kicks, data).log_likelihood - noise_model_of(kicks, data).log_likelihood
     assert ratio == pytest.approx(n * np.log(2.0), abs=0.01)
     # Beside white noise of the same variance the autoregression is likelier by what it predicts.
     phi1, phi2 = AR2
     variance = (1.0 - phi2) / ((1.0 + phi2) * ((1.0 - phi2) ** 2 - phi1**2))
-    alike = colour_of(np.sqrt(variance) * kicks, log).log_likelihood
-    gain = colour_of(series, log).log_likelihood - alike
+    alike = noise_model_of(np.sqrt(variance) * kicks, data).log_likelihood
+    gain = noise_model_of(series, data).log_likelihood - alike
     assert gain == pytest.approx(0.5 * n * np.log(variance), abs=20.0)
 
 
 def test_recordings_do_not_colour_each_other(fresh_seed: int):
     series, _ = autoregression(np.random.default_rng(fresh_seed), 2)
     both, one = empty_log(2), empty_log(1)
-    colour = colour_of(series, both)
-    together = whitened(series[None], colour, both)
+    noise_model = noise_model_of(series, both)
+    together = whitened(series[None], noise_model, both)
     for r in range(2):
-        np.testing.assert_allclose(together[0, r], whitened(series[None, r : r + 1], colour, one)[0, 0])
+        np.testing.assert_allclose(together[0, r], whitened(series[None, r : r + 1], noise_model, one)[0, 0])
 
 
 def test_a_model_that_ran_away_is_the_least_likely():
-    log = empty_log()
+    data = empty_log()
     lost = np.full((1, 1, ROWS), 1e3)
     noise = np.random.default_rng(0).normal(size=(1, 1, ROWS))
-    assert colour_of(lost, log).log_likelihood < colour_of(100.0 * noise, log).log_likelihood
+    assert noise_model_of(lost, data).log_likelihood < noise_model_of(100.0 * noise, data).log_likelihood
 
 
 def design(innovations: np.ndarray, counted: np.ndarray, surprises: np.ndarray) -> np.ndarray:
@@ -113,15 +118,15 @@ def test_products_are_those_of_the_matrix_of_lagged_rows(fresh_seed: int):
 
 
 def test_a_colour_is_the_least_squares_fit_and_leaves_white_what_it_does_not_foretell(fresh_seed: int):
-    log = empty_log(2)
+    data = empty_log(2)
     series, _ = autoregression(np.random.default_rng(fresh_seed), 2)
-    colour = colour_of(series, log)
-    matrix = design(series, log.counted, log.surprises)
+    noise_model = noise_model_of(series, data)
+    matrix = design(series, data.counted, data.surprises)
     now, past = matrix[:, :1], matrix[:, 1:]
     weights = np.linalg.lstsq(past, now, rcond=None)[0]
     left = (now - past @ weights)[:, 0]
-    np.testing.assert_allclose(colour.weights, weights, atol=1e-6)
+    np.testing.assert_allclose(noise_model.weights, weights, atol=1e-6)
     # The ridge of a billionth, times half the 12000 rows.
-    assert colour.log_likelihood == pytest.approx(-0.5 * len(left) * np.log(np.mean(left**2)), abs=1e-4)
-    white = whitened(series[None], colour, log)[0, :, 0][log.counted.T]
+    assert noise_model.log_likelihood == pytest.approx(-0.5 * len(left) * np.log(np.mean(left**2)), abs=1e-4)
+    white = whitened(series[None], noise_model, data)[0, :, 0][data.counted.T]
     np.testing.assert_allclose(white, left / np.sqrt(np.mean(left**2)), atol=1e-5)

@@ -10,7 +10,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.candidates.backlash_scan import plays
 from wipx.diagnosis.candidates.screening import basis_of
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.nonsmooth_search import alike, delays, explored
+from wipx.diagnosis.likelihood.nonsmooth_search import alike, delays, searched_by_trial
 from wipx.sim.inputs import Inputs
 
 PLAY = "actuator/backlash"
@@ -22,7 +22,7 @@ def test_trials_lose_nothing_and_intervals_hold_drives_that_cross_alike(fresh_se
     nominal = case.fit()
     near = {f"{PLAY}.{symbol}": value for symbol, value in {**TRUE, "gap": 1.3 * TRUE["gap"]}.items()}
     slopes = case.fitter.fit(Hypothesis.of(case.setting, (PLAY,), near), nominal.levels)
-    found = explored(case.fitter, slopes)
+    found = searched_by_trial(case.fitter, slopes)
     assert found.log_likelihood >= slopes.log_likelihood
     # A wide gap before a light drive is crossed as a narrow one before a heavy one.
     places = alike(case.fitter, found, found.log_likelihood - nominal.log_likelihood)
@@ -60,7 +60,7 @@ def test_a_delay_beside_play_is_no_soft_flank(fresh_seed: int):
 def test_a_fit_without_a_gap_is_left_as_it_is():
     case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.5}}, seed=3)
     fit = case.fit("translation/coulomb")
-    assert explored(case.fitter, fit) is fit
+    assert searched_by_trial(case.fitter, fit) is fit
     np.testing.assert_array_equal(alike(case.fitter, fit, 100.0), fit.hypothesis.cube[None])
 
 

@@ -18,7 +18,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import BEFORE, DIFFUSE, UNSETTLED, Gains, NoiseLevels, observer_gains
-from wipx.diagnosis.likelihood.recording_batch import SETTLES, Log
+from wipx.diagnosis.likelihood.recording_batch import SETTLES, RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along, transition_over
 from wipx.sim.analytic import Observer
 from wipx.sim.inputs import Inputs
@@ -53,9 +53,9 @@ def correlation(series: np.ndarray, lag: int) -> float:
 
 def test_innovations_of_the_true_model_are_white_and_of_unit_variance(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
-    gains = case.fitter.follower.gains(LEVELS, case.nominal)
-    shown = case.fitter.follower.innovations(ModelBatch(case.nominal), (gains,), np.zeros(1, int), np.zeros(1))
-    series = shown[0, 0, 0, case.log.counted[:, 0]]
+    gains = case.fitter.innovations_model.gains(LEVELS, case.nominal)
+    shown = case.fitter.innovations_model.innovations(ModelBatch(case.nominal), (gains,), np.zeros(1, int), np.zeros(1))
+    series = shown[0, 0, 0, case.data.counted[:, 0]]
     n = len(series)
     assert np.mean(series**2) == pytest.approx(1.0, abs=4.5 * np.sqrt(2.0 / n))  # 4.5 standard deviations
     for lag in (1, 2, 5, 20):
@@ -65,16 +65,16 @@ def test_innovations_of_the_true_model_are_white_and_of_unit_variance(fresh_seed
 def test_innovations_of_a_wrong_model_are_not(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     wrong = unit_axis({"translation/coulomb": {"F_c": 0.2}})
-    gains = case.fitter.follower.gains(LEVELS, wrong)
-    shown = case.fitter.follower.innovations(ModelBatch(wrong), (gains,), np.zeros(1, int), np.zeros(1))
-    series = shown[0, 0, 0, case.log.counted[:, 0]]
+    gains = case.fitter.innovations_model.gains(LEVELS, wrong)
+    shown = case.fitter.innovations_model.innovations(ModelBatch(wrong), (gains,), np.zeros(1, int), np.zeros(1))
+    series = shown[0, 0, 0, case.data.counted[:, 0]]
     assert correlation(series, 1) > 10.0 / np.sqrt(len(series))
 
 
 def test_noise_levels_come_back(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     start = NoiseLevels(5.0 * LEVELS.force, LEVELS.sensor)
-    fitter = InnovationFitter(case.fitter.follower)
+    fitter = InnovationFitter(case.fitter.innovations_model)
     levels = fitter.levels_of(fitter.fit(Hypothesis.of(case.setting, (), {}), start))
     # Recordings of this length tell the logarithm within a standard deviation of 0.14; the search ends within 0.2.
     assert np.log(levels.force[0] / LEVELS.force[0]) == pytest.approx(0.0, abs=0.2 + 4.5 * 0.14)
@@ -97,10 +97,10 @@ def test_gains_settle_at_the_solution_of_the_riccati_equation(kind: str):
     joints = len(model.plant.joints)
     t = DT * np.arange(2000)
     still = {name: np.zeros(len(t)) for name in (*model.plant.coordinates, *model.plant.commands)}
-    log = Log.of((Recording("still.csv", {"t": t, **still}),), model.plant)
+    data = RecordingBatch.of((Recording("still.csv", {"t": t, **still}),), model.plant)
     levels = NoiseLevels(np.array([0.05, 0.02])[:joints], np.array([1e-4, 3e-4])[:joints])
-    linear = linearise_along(model, log.measured[:, : log.joints])
-    (gains,) = observer_gains(linear, log, (levels,))
+    linear = linearise_along(model, data.measured[:, : data.joints])
+    (gains,) = observer_gains(linear, data, (levels,))
     a = np.block([[np.zeros((joints, joints)), np.eye(joints)], [linear.a[0]]])
     drive = np.zeros((2 * joints, 2 * joints))
     drive[joints:, joints:] = linear.b[0] @ np.diag(levels.force**2) @ linear.b[0].T
@@ -143,7 +143,7 @@ def test_a_late_noisy_sensor_beside_a_precise_one_is_followed_from_the_first_row
     assert np.all(np.diff(likelihoods) > 10.0)
 
 
-def uneven_log(kind: str, rng: np.random.Generator) -> Log:
+def uneven_log(kind: str, rng: np.random.Generator) -> RecordingBatch:
     """Recordings of different lengths with jitter and gaps, of which only times and places matter."""
     plant = nominal_model(kind).plant
     names = (*plant.coordinates, *plant.rates[-1:], *plant.commands)
@@ -152,22 +152,22 @@ def uneven_log(kind: str, rng: np.random.Generator) -> Log:
         t = np.cumsum(rng.choice((DT, 1.2 * DT, 5.0 * DT), rows, p=(0.6, 0.3, 0.1)))
         columns = {name: rng.normal(size=rows).cumsum() * 0.03 for name in names}
         recordings.append(Recording(f"r{rows}.csv", {"t": t, **columns}))
-    return Log.of(tuple(recordings), plant)
+    return RecordingBatch.of(tuple(recordings), plant)
 
 
 @pytest.mark.parametrize("kind", ["linear_axis", "wip", "double_pendulum"])
 @pytest.mark.parametrize("late", [0.0, 0.02])
 def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late: float, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
-    log = uneven_log(kind, rng)
-    linear = linearise_along(nominal_model(kind), log.measured[:, : log.joints])
-    delays = (late,) * log.joints
-    sizes = np.exp(rng.uniform(-7.0, -3.0, (3, log.joints + len(log.channels))))
-    levels = [NoiseLevels(size[: log.joints], size[log.joints :]) for size in sizes]
-    for level, found in zip(levels, observer_gains(linear, log, levels, delays), strict=True):
+    data = uneven_log(kind, rng)
+    linear = linearise_along(nominal_model(kind), data.measured[:, : data.joints])
+    delays = (late,) * data.joints
+    sizes = np.exp(rng.uniform(-7.0, -3.0, (3, data.joints + len(data.channels))))
+    levels = [NoiseLevels(size[: data.joints], size[data.joints :]) for size in sizes]
+    for level, found in zip(levels, observer_gains(linear, data, levels, delays), strict=True):
         for r in range(2):
-            plain = plain_filter(linear, log, level, np.array(delays), r)
-            last = int(log.inputs.last[r]) + 1
+            plain = plain_filter(linear, data, level, np.array(delays), r)
+            last = int(data.inputs.last[r]) + 1
             # A first state known 1e4 times worse than the sensors costs more than half of the digits.
             scale = np.abs(plain.gains).max()
             np.testing.assert_allclose(found.gains[:last, r], plain.gains, atol=2e-4 * scale)
@@ -177,27 +177,27 @@ def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late
             assert not found.gains[last:, r].any()
 
 
-def plain_filter(linear: Linearisation, log: Log, levels: NoiseLevels, late: np.ndarray, r: int) -> Gains:
+def plain_filter(linear: Linearisation, data: RecordingBatch, levels: NoiseLevels, late: np.ndarray, r: int) -> Gains:
     """The recursion in matrices, one row of one recording at a time."""
-    joints, t = log.joints, log.inputs.t[:, r] - log.inputs.t[0, r]
-    h = np.eye(2 * joints)[log.channels]
-    for c, channel in enumerate(log.channels):
+    joints, t = data.joints, data.inputs.t[:, r] - data.inputs.t[0, r]
+    h = np.eye(2 * joints)[data.channels]
+    for c, channel in enumerate(data.channels):
         if channel < joints:
             h[c, channel + joints] = -late[channel]
     variance = levels.sensor**2
     first = 9.0 * np.diag(np.concatenate([variance[:joints], variance[:joints] / 0.02**2]))
     p, transition, gains, whitening = DIFFUSE * first, np.zeros_like(first), [], []
-    for k in range(int(log.inputs.last[r]) + 1):
+    for k in range(int(data.inputs.last[r]) + 1):
         if k > 0 and t[k - 1] <= SETTLES < t[k]:
             p = first
-        unseen = [0.0 if c >= joints else max(late[c] - t[k], 0.0) for c in log.channels]
+        unseen = [0.0 if c >= joints else max(late[c] - t[k], 0.0) for c in data.channels]
         heard = variance + (BEFORE * np.array(unseen)) ** 2
         s = h @ p @ h.T + np.diag(heard)
         gain = p @ h.T @ np.linalg.inv(s)
         gains.append(np.zeros_like(first))
-        gains[-1][:, log.channels] = gain
+        gains[-1][:, data.channels] = gain
         whitening.append(np.linalg.inv(np.linalg.cholesky(s)))
-        dt = float(log.intervals[k, r]) if k < log.inputs.last[r] else 0.0
+        dt = float(data.intervals[k, r]) if k < data.inputs.last[r] else 0.0
         place = linear.place[k, r]
         transition_over(linear.a[place], dt, transition)
         drive = linear.b[place] @ np.diag(levels.force**2) @ linear.b[place].T
@@ -212,34 +212,34 @@ def test_following_without_gains_is_replaying(kind: str):
     case = bench(kind, {}, seed=2, duration=1.0)
     joints = len(case.nominal.plant.joints)
     batch = ModelBatch(case.nominal)
-    rows, recordings = case.log.rows.shape
+    rows, recordings = case.data.rows.shape
     start = np.full((2 * joints, 1, recordings), 0.01)
     idle = np.zeros((1, rows, recordings, 2 * joints, 2 * joints))
     calm = np.zeros((1, len(case.nominal.plant.commands)))
-    observer = Observer(case.log.measured, idle, np.zeros(1, dtype=np.int64), calm)
-    followed = SIMULATOR.follow(batch, case.log.inputs, start, observer)
-    replayed = SIMULATOR.replay(batch, case.log.inputs, start)
+    observer = Observer(case.data.measured, idle, np.zeros(1, dtype=np.int64), calm)
+    followed = SIMULATOR.follow(batch, case.data.inputs, start, observer)
+    replayed = SIMULATOR.replay(batch, case.data.inputs, start)
     np.testing.assert_array_equal(followed.coordinates, replayed.coordinates)
     np.testing.assert_array_equal(followed.rates, replayed.rates)
 
 
 def test_full_gains_put_the_state_on_the_recording():
     case = bench("linear_axis", {}, seed=2, duration=1.0)
-    rows, recordings = case.log.rows.shape
+    rows, recordings = case.data.rows.shape
     follow_x = np.zeros((1, rows, recordings, 2, 2))
     follow_x[..., 0, 0] = 1.0
-    observer = Observer(case.log.measured, follow_x, np.zeros(1, dtype=np.int64), np.zeros((1, 1)))
+    observer = Observer(case.data.measured, follow_x, np.zeros(1, dtype=np.int64), np.zeros((1, 1)))
     start = np.zeros((2, 1, recordings))
-    shown = SIMULATOR.follow(ModelBatch(case.nominal), case.log.inputs, start, observer)
+    shown = SIMULATOR.follow(ModelBatch(case.nominal), case.data.inputs, start, observer)
     ahead = np.diff(shown.coordinates[:, 0, 0], axis=0)
-    moved = shown.coordinates[1:, 0, 0] - case.log.measured[:-1, 0]
+    moved = shown.coordinates[1:, 0, 0] - case.data.measured[:-1, 0]
     rate = 0.5 * (shown.rates[1:, 0, 0] + shown.rates[:-1, 0, 0])
-    np.testing.assert_allclose(moved, rate * np.diff(case.log.inputs.t, axis=0), atol=1e-9)
+    np.testing.assert_allclose(moved, rate * np.diff(case.data.inputs.t, axis=0), atol=1e-9)
     assert not np.allclose(ahead, moved, atol=1e-9)
 
 
 def test_a_recording_that_is_left_out_does_not_count():
     case = bench("linear_axis", {}, seed=2, duration=1.0)
-    without = replace(case.log, left_out=1)
+    without = replace(case.data, left_out=1)
     assert without.counted[:, 0].any()
     assert not without.counted[:, 1].any()

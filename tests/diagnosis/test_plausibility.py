@@ -9,13 +9,13 @@ from identify.emulated_robot import Robot, nominal_model
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.decision.plausibility import Slip, check_plausible, slips
+from wipx.diagnosis.decision.plausibility import Mistake, check_plausible, mistakes
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.recordings.source import RecordingSource
@@ -37,21 +37,21 @@ EXAMPLES = {
     "two_effects": ("actuator/delay",),
     "pendulum": ("pitch/coulomb",),
 }
-SLIPS_OF = {kind: [slip.undone for slip in slips(nominal_model(kind))] for kind in ("wip", "pendulum")}
+SLIPS_OF = {kind: [mistake.undone for mistake in mistakes(nominal_model(kind))] for kind in ("wip", "pendulum")}
 BAD_UNITS = (
-    Slip("", "body mass in g", "", parameters={"body_mass": 1e-3}),
-    Slip("", "inertia in g m^2", "", parameters={"body_inertia": 1e-3}),
-    Slip("", "inertia in kg cm^2", "", parameters={"body_inertia": 1e-4}),
-    Slip("", "height in mm", "", parameters={"com_height": 1e-3}),
-    Slip("", "height in cm", "", parameters={"com_height": 1e-2}),
+    Mistake("", "body mass in g", "", parameters={"body_mass": 1e-3}),
+    Mistake("", "inertia in g m^2", "", parameters={"body_inertia": 1e-3}),
+    Mistake("", "inertia in kg cm^2", "", parameters={"body_inertia": 1e-4}),
+    Mistake("", "height in mm", "", parameters={"com_height": 1e-3}),
+    Mistake("", "height in cm", "", parameters={"com_height": 1e-2}),
 )
 
 
 def checked(model: Model, recordings: Recordings, effects: tuple[str, ...] = ()) -> None:
     """Ask whether the model is plausible, where these effects are the best that could be added."""
-    log = Log.of(recordings, model.plant)
+    data = RecordingBatch.of(recordings, model.plant)
     setting = Setting(model, {}, scales_of(model, recordings))
-    fitter = InnovationFitter(Follower.of(AnalyticSimulator(threads=1), log, model))
+    fitter = InnovationFitter(InnovationsModel.of(AnalyticSimulator(threads=1), data, model))
     force = np.array([1e-3 * setting.scales[site].force for site in model.plant.joints])
     levels = NoiseLevels(force, sensor_noise(recordings, model.plant))
     nominal = fitted(fitter, setting, (), levels)
@@ -63,10 +63,10 @@ def fitted(fitter: InnovationFitter, setting: Setting, effects: tuple[str, ...],
     return fitter.polished(fitter.fit(Hypothesis.of(setting, effects, {}), levels), rounds=2)
 
 
-def with_slip(slip: Slip, model: Model, recordings: Recordings) -> tuple[Model, Recordings]:
+def with_slip(mistake: Mistake, model: Model, recordings: Recordings) -> tuple[Model, Recordings]:
     """What an owner has who makes a slip: the inverse of putting it right."""
-    columns = {name: (1.0 / factor, -offset / factor) for name, (factor, offset) in slip.columns.items()}
-    made = Slip("", "", "", columns, {name: 1.0 / factor for name, factor in slip.parameters.items()})
+    columns = {name: (1.0 / factor, -offset / factor) for name, (factor, offset) in mistake.columns.items()}
+    made = Mistake("", "", "", columns, {name: 1.0 / factor for name, factor in mistake.parameters.items()})
     return made.model(model), tuple(made.recording(r) for r in recordings)
 
 
@@ -91,38 +91,40 @@ def test_examples_are_plausible(name: str, examples: Path):
 def test_slips_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
     model = nominal_model("wip")
     recordings = Robot(model.with_effects(MISSING["gain"])).record(np.random.default_rng(fresh_seed), 2)
-    slip = next(slip for slip in slips(model) if slip.undone == undone)
-    with pytest.raises(InputError, match=f"^robot.yaml: the recordings contradict its {slip.contradicted} .*{undone}"):
-        checked(*with_slip(slip, model, recordings), ("translation/viscous",))
+    mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
+    with pytest.raises(
+        InputError, match=f"^robot.yaml: the recordings contradict its {mistake.contradicted} .*{undone}"
+    ):
+        checked(*with_slip(mistake, model, recordings), ("translation/viscous",))
 
 
 @pytest.mark.parametrize("undone", SLIPS_OF["pendulum"])
 def test_slips_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
     model = nominal_model("pendulum")
     recordings = Robot(model.with_effects({"pitch/coulomb": {"F_c": 0.2}})).record(np.random.default_rng(fresh_seed))
-    slip = next(slip for slip in slips(model) if slip.undone == undone)
+    mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
     with pytest.raises(InputError, match=f"with {undone}"):
-        checked(*with_slip(slip, model, recordings), ("pitch/viscous",))
+        checked(*with_slip(mistake, model, recordings), ("pitch/viscous",))
 
 
-@pytest.mark.parametrize("slip", BAD_UNITS, ids=lambda slip: slip.undone)
+@pytest.mark.parametrize("slip", BAD_UNITS, ids=lambda mistake: mistake.undone)
 @pytest.mark.parametrize("kind", ["wip", "pendulum"])
-def test_numbers_in_a_wrong_unit_are_named(kind: str, slip: Slip, fresh_seed: int):
+def test_numbers_in_a_wrong_unit_are_named(kind: str, mistake: Mistake, fresh_seed: int):
     model = nominal_model(kind)
     recordings = Robot(model).record(np.random.default_rng(fresh_seed), 2)
-    (name,) = slip.parameters
+    (name,) = mistake.parameters
     with pytest.raises(InputError, match=f"write {name}: {model.parameters[name]:.5g} if it is in"):
-        checked(*with_slip(slip, model, recordings))
+        checked(*with_slip(mistake, model, recordings))
 
 
 @pytest.mark.parametrize("name", ["two_effects", "pendulum"])
 def test_a_reversed_command_of_an_example_is_named(name: str, examples: Path):
     model, recordings = example(examples / name)
-    slip = slips(model)[0]
+    mistake = mistakes(model)[0]
     with pytest.raises(InputError, match=r"reverse it with signals: {u: {column: u, scale: -1}}"):
-        checked(*with_slip(slip, model, recordings), ("actuator/gain",))
+        checked(*with_slip(mistake, model, recordings), ("actuator/gain",))
 
 
 def test_a_sound_body_has_no_number_in_a_wrong_unit():
     for kind in ("wip", "cartpole", "pendulum", "linear_axis", "double_pendulum"):
-        assert not any(slip.parameters for slip in slips(nominal_model(kind)))
+        assert not any(mistake.parameters for mistake in mistakes(nominal_model(kind)))

@@ -55,8 +55,8 @@ def test_scale_and_zero_of_the_drive_are_not_trusted(kind: str, fresh_seed: int)
 def test_a_repeated_command_tells_nothing():
     plain = bench("wip", {}, seed=1)
     echo = tuple(Recording(r.name, {**r.columns, "u_measured": 0.9 * r["u"]}, r.source) for r in plain.recordings)
-    assert plain.log.reported.shape[1] == 0
-    assert Bench(plain.nominal, echo, {}).log.reported.shape[1] == 0
+    assert plain.data.reported.shape[1] == 0
+    assert Bench(plain.nominal, echo, {}).data.reported.shape[1] == 0
 
 
 @pytest.mark.parametrize("kind", ["wip", "linear_axis"])

@@ -6,7 +6,7 @@ from diagnosis.recorded import Bench, bench, recorded
 from identify.emulated_robot import nominal_model
 
 from wipx.diagnosis.residuals.discrepancy import process_mean
-from wipx.diagnosis.residuals.residual_tests import leftovers, shapes_of
+from wipx.diagnosis.residuals.residual_tests import residual_tests, shapes_of
 from wipx.effects.remainder import KNOTS
 
 RATE_OF_CARRIAGE = 2.0  # code of the signal in `remainder`
@@ -57,7 +57,7 @@ def test_what_swings_along_is_named_beyond_the_vocabulary(fresh_seed: int):
     assert answer.unexplained.site == "translation"
     assert "translation/resonance" in answer.unexplained.resembles
     (found,) = (effect for effect in answer.effects if effect.name == "translation/resonance")
-    assert found.beyond
+    assert found.outside_vocabulary
     values = {p.name.rpartition(".")[2]: p.value for p in found.parameters}
     assert values["m"] == pytest.approx(0.3, rel=0.02)
     assert values["f"] == pytest.approx(2.0, rel=0.01)
@@ -67,7 +67,7 @@ def test_what_swings_along_is_named_beyond_the_vocabulary(fresh_seed: int):
 def test_nothing_is_left_over_by_the_true_model(kind: str):
     case = bench(kind, {}, seed=8)
     fit = case.fit()
-    found = leftovers(case.fitter, fit, shapes_of(case.fitter, fit))
+    found = residual_tests(case.fitter, fit, shapes_of(case.fitter, fit))
     assert min(one.p_value for one in found) * len(found) > 1e-2
     assert max(one.gain for one in found) < 20.0  # up to nine forces each
 
@@ -86,7 +86,7 @@ def test_p_values_of_a_true_model_are_spread_evenly(fresh_seed: int):
     for seed in seeds:
         case = Bench(nominal_model("linear_axis"), recorded("linear_axis", {}, int(seed), count=1), {})
         fit = case.fit()
-        found = leftovers(case.fitter, fit, shapes_of(case.fitter, fit))
+        found = residual_tests(case.fitter, fit, shapes_of(case.fitter, fit))
         smallest.append(min(one.p_value for one in found) * len(found))
     assert min(smallest) > 1e-4  # what counts as significant; by chance once in 800 such tests
     assert np.mean(np.array(smallest) < 0.05) < 0.5

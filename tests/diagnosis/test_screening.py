@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench
 
-from wipx.diagnosis.candidates.screening import Prospect, prospects
+from wipx.diagnosis.candidates.screening import Candidate, candidates_beside
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 
 SMALL = {  # each worth some tens of nats in these recordings
@@ -15,12 +15,12 @@ SMALL = {  # each worth some tens of nats in these recordings
 }
 
 
-def best_prospects(case: Bench) -> dict[str, Prospect]:
+def best_prospects(case: Bench) -> dict[str, Candidate]:
     """The best start of each effect beside the nominal model, at the noise that the sensors have."""
     fit = case.fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet)
-    found: dict[str, Prospect] = {}
-    for prospect in prospects(case.fitter, case.setting, fit):
-        found.setdefault(prospect.effect, prospect)
+    found: dict[str, Candidate] = {}
+    for candidate in candidates_beside(case.fitter, case.setting, fit):
+        found.setdefault(candidate.effect, candidate)
     return found
 
 
@@ -29,25 +29,27 @@ def test_a_small_dose_gains_what_fitting_it_gains(effect: str):
     kind, values = SMALL[effect]
     case = bench(kind, {effect: values}, seed=4)
     nominal = case.fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet)
-    prospect = best_prospects(case)[effect]
-    fitted = case.fitter.fit(Hypothesis.of(case.setting, (effect,), prospect.values), case.quiet)
+    candidate = best_prospects(case)[effect]
+    fitted = case.fitter.fit(Hypothesis.of(case.setting, (effect,), candidate.values), case.quiet)
     gained = fitted.log_likelihood - nominal.log_likelihood
     assert gained > 5.0
-    assert prospect.gain == pytest.approx(gained, rel=0.2)
+    assert candidate.gain == pytest.approx(gained, rel=0.2)
     (symbol,) = values
-    assert prospect.values[f"{effect}.{symbol}"] == pytest.approx(values[symbol], abs=4.0 * prospect.deviation)
+    assert candidate.values[f"{effect}.{symbol}"] == pytest.approx(values[symbol], abs=4.0 * candidate.deviation)
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis", "double_pendulum"])
 def test_absent_effects_gain_next_to_nothing(kind: str):
     found = best_prospects(bench(kind, {}, seed=4))
     assert found
-    assert max(prospect.gain for prospect in found.values()) < 6.0  # chi-squared, one degree of freedom: 12
+    assert max(candidate.gain for candidate in found.values()) < 6.0  # chi-squared, one degree of freedom: 12
 
 
 def test_an_effect_at_hand_is_not_looked_for_again():
     case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.3}}, seed=4)
-    names = {prospect.effect for prospect in prospects(case.fitter, case.setting, case.fit("translation/coulomb"))}
+    names = {
+        candidate.effect for candidate in candidates_beside(case.fitter, case.setting, case.fit("translation/coulomb"))
+    }
     assert "translation/coulomb" not in names
     assert "translation/stribeck" not in names  # the same friction with more to it
     assert "environment/rail_tilt" in names
@@ -56,10 +58,12 @@ def test_an_effect_at_hand_is_not_looked_for_again():
 def test_the_vocabulary_comes_before_what_is_beyond_it():
     case = bench("linear_axis", {}, seed=4)
     nominal = case.fit()
-    within = {prospect.effect for prospect in prospects(case.fitter, case.setting, nominal)}
-    beyond = {prospect.effect for prospect in prospects(case.fitter, case.setting, nominal, beyond=True)}
-    assert within.isdisjoint(beyond)
-    assert "translation/lugre" in beyond
+    within = {candidate.effect for candidate in candidates_beside(case.fitter, case.setting, nominal)}
+    outside_vocabulary = {
+        candidate.effect for candidate in candidates_beside(case.fitter, case.setting, nominal, outside_vocabulary=True)
+    }
+    assert within.isdisjoint(outside_vocabulary)
+    assert "translation/lugre" in outside_vocabulary
 
 
 def test_a_deviation_shrinks_with_the_root_of_the_recordings():

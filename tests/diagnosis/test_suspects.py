@@ -80,7 +80,7 @@ def test_an_absent_effect_gains_too_little_and_its_size_is_excluded(answer: Diag
     suspect = by_name(answer)["translation/viscous"]
     assert not suspect.named
     assert suspect.in_place_of == ()
-    assert suspect.log_evidence_gain < suspect.needed
+    assert suspect.log_evidence_gain < suspect.required_gain
     assert suspect.parameters[0].low == pytest.approx(0.0, abs=0.05 * SIGMA)
     assert suspect.parameters[0].high < SIGMA
     assert size_of(suspect).excluded
@@ -101,13 +101,13 @@ def test_a_richer_law_takes_the_place_of_the_simple_one(answer: Diagnosis):
     level = suspect.parameters[0]
     assert level.name == "translation/presliding.F_c"
     assert level.value == pytest.approx(LEVEL, rel=0.05)
-    assert suspect.log_evidence_gain > suspect.needed
+    assert suspect.log_evidence_gain > suspect.required_gain
 
 
 def test_without_a_size_only_the_free_one_is_told(answer: Diagnosis):
     suspect = by_name(answer)["actuator/delay"]
     assert suspect.size is None
-    assert suspect.log_evidence_gain < suspect.needed
+    assert suspect.log_evidence_gain < suspect.required_gain
     assert suspect.sentence.endswith("too little to be named.")
 
 
@@ -174,7 +174,7 @@ def test_a_suspect_that_excludes_an_effect_of_the_nominal_model_is_refused():
 
 def test_what_gains_enough_is_judged_beside_its_own_size():
     size = SuspectedSize({"F_c": 0.289}, -16.0, 5.7, True, 2.2, True, 0.6)
-    suspect = suspect_with(size, needed=14.0, transfers=True)
+    suspect = suspect_with(size, required_gain=14.0, transfers=True)
     assert suspect.supported
     assert suspect_sentence(suspect, unexplained=False) == (
         "pitch/coulomb: would be F_c = 0.21 N m [0.15, 0.27] and gain 24.0 nats, enough to be named (14.0 needed); "
@@ -183,10 +183,10 @@ def test_what_gains_enough_is_judged_beside_its_own_size():
     )
 
 
-def suspect_with(size: SuspectedSize, *, needed: float = 43.0, transfers: bool = False) -> Suspect:
+def suspect_with(size: SuspectedSize, *, required_gain: float = 43.0, transfers: bool = False) -> Suspect:
     """A suspect whose free size is 0.21 N m, with which it gains 24 nats."""
     number = Estimate("pitch/coulomb.F_c", "N m", 0.0, 0.21, 0.15, 0.27, False, "Coulomb level")
-    return Suspect("pitch/coulomb", False, (), (number,), 24.0, needed, -0.1, transfers, -24.0, size)
+    return Suspect("pitch/coulomb", False, (), (number,), 24.0, required_gain, -0.1, transfers, -24.0, size)
 
 
 def beside_the_answer(loss: float, loss_to_free: float) -> SuspectedSize:

@@ -8,7 +8,7 @@ from report import synthetic
 from wipx.core.diagnosis import (
     Alternative,
     Bound,
-    Candidate,
+    ConsideredEffect,
     Curve,
     Diagnosis,
     ErrorMap,
@@ -65,7 +65,7 @@ def found_effects() -> tuple[FoundEffect, ...]:
         name="translation/coulomb",
         law="-F_c s(v), any force in [-F_c, F_c] at v = 0",
         source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
-        beyond=False,
+        outside_vocabulary=False,
         parameters=(Estimate("translation/coulomb.F_c", "N", 0.0, 3.1042, 2.93, 3.29, False, "Coulomb level"),),
         equivalent=(),
         rivals=(
@@ -82,7 +82,7 @@ def found_effects() -> tuple[FoundEffect, ...]:
         name="actuator/delay",
         law="F(t) = u(t - tau)",
         source="contract, section 3",
-        beyond=False,
+        outside_vocabulary=False,
         parameters=(Estimate("actuator/delay.tau", "s", 0.0, 0.00412, 0.00395, 0.0043, False, "delay"),),
         equivalent=("actuator/lag",),
         rivals=(Alternative("actuator/lag", 0.7, {"tau": 0.0041}),),
@@ -140,16 +140,24 @@ def mismatch() -> Diagnosis:
         held_out=errors.held_out,
         unexplained=NOTHING_LEFT,
         candidates=(
-            Candidate("translation/viscous", 210.0, False, "Coulomb friction explains more with as many numbers"),
-            Candidate("translation/coulomb", 412.3, True, "explains the most"),
-            Candidate("translation/stribeck", 413.0, False, "adds 0.7 nats for two more numbers"),
-            Candidate("actuator/delay", 38.0, True, "explains the most beside Coulomb friction"),
-            Candidate("actuator/lag", 37.6, False, "cannot be told from the delay"),
-            Candidate("pitch/coulomb + actuator/gain", 6.1, False, "not significant"),
-            Candidate("environment/spring", -0.3, False, "adds nothing"),
-            *(Candidate(f"actuator/{kind}", 0.5, False, "adds nothing") for kind in ("backlash", "ripple", "gain")),
-            *(Candidate(f"pitch/{kind}", 0.2, False, "adds nothing") for kind in ("stribeck", "lugre", "coulomb")),
-            Candidate("sensor_theta/bias", float("nan"), False, "could not be fitted"),
+            ConsideredEffect(
+                "translation/viscous", 210.0, False, "Coulomb friction explains more with as many numbers"
+            ),
+            ConsideredEffect("translation/coulomb", 412.3, True, "explains the most"),
+            ConsideredEffect("translation/stribeck", 413.0, False, "adds 0.7 nats for two more numbers"),
+            ConsideredEffect("actuator/delay", 38.0, True, "explains the most beside Coulomb friction"),
+            ConsideredEffect("actuator/lag", 37.6, False, "cannot be told from the delay"),
+            ConsideredEffect("pitch/coulomb + actuator/gain", 6.1, False, "not significant"),
+            ConsideredEffect("environment/spring", -0.3, False, "adds nothing"),
+            *(
+                ConsideredEffect(f"actuator/{kind}", 0.5, False, "adds nothing")
+                for kind in ("backlash", "ripple", "gain")
+            ),
+            *(
+                ConsideredEffect(f"pitch/{kind}", 0.2, False, "adds nothing")
+                for kind in ("stribeck", "lugre", "coulomb")
+            ),
+            ConsideredEffect("sensor_theta/bias", float("nan"), False, "could not be fitted"),
         ),
         bounds=(
             Bound("environment/rail_tilt.angle", -0.0011, 0.0009, "rad"),

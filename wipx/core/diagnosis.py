@@ -79,7 +79,7 @@ class FoundEffect:
         name: "site/kind".
         law: Its equation.
         source: Paper or book.
-        beyond: Whether the vocabulary of contract section 3 lacks it.
+        outside_vocabulary: Whether the vocabulary of contract section 3 lacks it.
         parameters: Its numbers with 95 % intervals.
         equivalent: Effects that these recordings cannot tell from it.
         rivals: Other effects in its place, the closest first; `equivalent` among them.
@@ -93,7 +93,7 @@ class FoundEffect:
     name: str
     law: str
     source: str
-    beyond: bool
+    outside_vocabulary: bool
     parameters: tuple[Estimate, ...]
     equivalent: tuple[str, ...]
     rivals: tuple[Alternative, ...]
@@ -260,7 +260,7 @@ class Remainder:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ConsideredEffect:
     """An effect, or several, that was considered.
 
     Attributes:
@@ -360,7 +360,7 @@ class Suspect:
         in_place_of: Effects of the answer in whose place it was fitted: they cannot stand beside it.
         parameters: Its numbers, if they are free, with 95 % intervals.
         log_evidence_gain: Log-likelihood that it adds then to the other effects, in nats.
-        needed: Nats that it needs to be named.
+        required_gain: Nats that it needs to be named.
         heldout_gain: Share of the squared prediction error on recordings it was not fitted to that it removes then.
         transfers: Whether it makes recordings likelier that it was not fitted to.
         loss: Nats by which the answer is better than with this effect; zero or less unless it is `in_place_of` others.
@@ -373,7 +373,7 @@ class Suspect:
     in_place_of: tuple[str, ...]
     parameters: tuple[Estimate, ...]
     log_evidence_gain: float
-    needed: float
+    required_gain: float
     heldout_gain: float
     transfers: bool
     loss: float
@@ -383,7 +383,7 @@ class Suspect:
     @property
     def supported(self) -> bool:
         """Whether the recordings speak for the effect: it is named, or gains what it needs."""
-        return self.named or self.log_evidence_gain >= self.needed
+        return self.named or self.log_evidence_gain >= self.required_gain
 
 
 @dataclass(frozen=True)
@@ -429,7 +429,7 @@ class Diagnosis:
     fit: FitErrors
     held_out: FitErrors
     unexplained: Unexplained
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[ConsideredEffect, ...]
     bounds: tuple[Bound, ...]
     weak: tuple[str, ...]
     next_experiment: NextExperiment | None

@@ -40,8 +40,8 @@ class Effect:
         excludes: Kinds that cannot act at the same site at the same time.
         needs: Joints or plant parameters without which the effect has no meaning.
         doubt: Relative standard deviation of its first number by what its law leaves open.
-        beyond: Whether contract section 3 lacks it: a diagnosis names such an effect only where those of the
-            contract leave something over.
+        outside_vocabulary: Whether contract section 3 lacks it. A diagnosis names such an effect only where those of
+            the contract leave something over.
         steady: Its curve; None where no single signal decides its force.
     """
 
@@ -54,7 +54,7 @@ class Effect:
     excludes: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     doubt: float = 0.0
-    beyond: bool = False
+    outside_vocabulary: bool = False
     steady: Steady | None = None
 
     @property

@@ -12,7 +12,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.answer.answer import answered, proposed
 from wipx.diagnosis.answer.caveats import caveats
 from wipx.diagnosis.answer.suspects import asked, check_suspects
-from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
@@ -91,28 +91,28 @@ def diagnose(
     halves = in_two(recordings)
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    inquiry = Inquiry.of(halves, setting, simulator)
+    context = Context.of(halves, setting, simulator)
     watcher("noise of the nominal model", 0.02)
-    fitter = inquiry.by_row
-    nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), inquiry.first_levels))
-    selection = Selection(fitter, setting, nominal, inquiry.transfers)
+    fitter = context.by_row
+    nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
+    selection = Selection(fitter, setting, nominal, context.transfers)
     watcher("looking for missing effects", 0.1)
     first = selection.extensions(nominal)
-    if inquiry.is_driven:
+    if context.is_driven:
         check_plausible(fitter, setting, selection.nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     chosen = selection.run()
     watcher("what is left over", 0.5)
-    end = found(inquiry, selection, chosen)
-    inquiry, selection, rest = end.inquiry, end.selection, end.rest
+    end = found(context, selection, chosen)
+    context, selection, rest = end.context, end.selection, end.rest
     watcher("held-out recordings", 0.75)
-    answer = answered(inquiry, selection, rest, end.shapes)
+    answer = answered(context, selection, rest, end.shapes)
     watcher("next experiment", 0.9)
-    proposal = proposed(inquiry, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    proposal = proposed(context, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
     answer = replace(answer, next_experiment=proposal)
     if suspected:
         watcher("suspects", 0.95)
-        answer = replace(answer, suspects=asked(inquiry, selection, rest, answer, suspected))
+        answer = replace(answer, suspects=asked(context, selection, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
     return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)

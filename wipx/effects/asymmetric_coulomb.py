@@ -24,6 +24,6 @@ EFFECT = Effect(
     ),
     source="Bona, Indri 2005, Friction compensation in robotics: an overview, CDC",
     excludes=("coulomb",),
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("rate", _steady),
 )

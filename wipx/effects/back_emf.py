@@ -21,6 +21,6 @@ EFFECT = Effect(
     law="F = u - k_e v",
     linear_in=("k_e",),
     source="DC motor equation; Duclusaud, Passault 2025, arXiv:2410.08650",
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("rate", _steady),
 )

@@ -41,7 +41,7 @@ EFFECT = Effect(
     ),
     source="Bouc 1967; Wen 1976, Method for random vibration of hysteretic systems, ASCE J. Eng. Mech. 102(2)",
     excludes=("presliding", "lugre"),
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("rate", _steady),
 )
 

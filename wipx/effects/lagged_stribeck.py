@@ -42,7 +42,7 @@ EFFECT = Effect(
     "else s(v) [F_c + (F_s - F_c) exp(-(v/v_s)^2)] + sigma v",
     source="Baek, Sim, Purushottam, Gupta, Ramos 2024, Eq. 5",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding", "lugre", "viscous"),
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("rate", _steady),
 )
 

@@ -20,7 +20,7 @@ EFFECT = Effect(
         "K_external",
     ),
     source="Duclusaud, Passault 2025, Extended friction models for servo actuators, arXiv:2410.08650",
-    beyond=True,
+    outside_vocabulary=True,
 )
 
 

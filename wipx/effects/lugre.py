@@ -33,6 +33,6 @@ EFFECT = Effect(
     ),
     source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3)",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding"),
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("rate", _steady),
 )

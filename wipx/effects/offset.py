@@ -17,6 +17,6 @@ EFFECT = Effect(
     law="F = u + F_0",
     linear_in=("F_0",),
     source="Wiebe et al. 2022, Torque-limited simple pendulum, JOSS 7(74)",
-    beyond=True,
+    outside_vocabulary=True,
     steady=Steady("command", _steady),
 )

@@ -24,5 +24,5 @@ EFFECT = Effect(
     law="+ f(signal), + f(signal) u or - f(signal) sign(v), piecewise linear between nine knots",
     linear_in=tuple(f"f{i}" for i in range(KNOTS)),
     source="Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, ch. 2",
-    beyond=True,
+    outside_vocabulary=True,
 )

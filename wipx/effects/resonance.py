@@ -23,5 +23,5 @@ EFFECT = Effect(
     law="+ m (w^2 y + 2 zeta w y'), y'' = -q'' - w^2 y - 2 zeta w y', w = 2 pi f",
     linear_in=("m",),
     source="Ibrahim 2005, Liquid Sloshing Dynamics, ch. 5 (equivalent mechanical models)",
-    beyond=True,
+    outside_vocabulary=True,
 )

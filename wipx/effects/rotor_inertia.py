@@ -10,5 +10,5 @@ EFFECT = Effect(
     law="-J v'",
     linear_in=("J",),
     source="Spong 1987, Modeling and control of elastic joint robots, ASME JDSMC 109(4)",
-    beyond=True,
+    outside_vocabulary=True,
 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.core.diagnosis import Candidate, Curve, Diagnosis, ErrorMap
+from wipx.core.diagnosis import ConsideredEffect, Curve, Diagnosis, ErrorMap
 from wipx.core.plant import COLUMN_UNITS
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report.charts import comparison_data, json_number
@@ -47,18 +47,18 @@ def titled_curves(diagnosis: Diagnosis) -> tuple[TitledCurve, ...]:
     return tuple(curves)
 
 
-def ranked_candidates(diagnosis: Diagnosis) -> tuple[Candidate, ...]:
+def ranked_candidates(diagnosis: Diagnosis) -> tuple[ConsideredEffect, ...]:
     """What was considered, each once, the largest gain first; those without a known gain last.
 
     An effect of the answer has its gain there, others the largest that they had in the search.
     """
-    found: dict[str, Candidate] = {}
+    found: dict[str, ConsideredEffect] = {}
     for candidate in diagnosis.candidates:
         before = found.get(candidate.name)
         if not candidate.chosen and (before is None or not before.gain >= candidate.gain):
             found[candidate.name] = candidate
     for effect in diagnosis.effects:
-        found[effect.name] = Candidate(effect.name, effect.log_evidence_gain, True, "part of the answer")
+        found[effect.name] = ConsideredEffect(effect.name, effect.log_evidence_gain, True, "part of the answer")
     return tuple(sorted(found.values(), key=lambda c: -c.gain if math.isfinite(c.gain) else math.inf))
 
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 
-from wipx.core.diagnosis import Candidate, Diagnosis, ErrorMap
+from wipx.core.diagnosis import ConsideredEffect, Diagnosis, ErrorMap
 from wipx.report.diagnosis_charts import (
     TitledCurve,
     bar_length,
@@ -125,7 +125,7 @@ def _draw_evidence(axes: Axes, diagnosis: Diagnosis) -> None:
     axes.set_title("evidence [nats], log lengths\nblue: part of the answer", loc="left", fontsize=10, color=MUTED)
 
 
-def _leading_candidates(diagnosis: Diagnosis) -> list[Candidate]:
+def _leading_candidates(diagnosis: Diagnosis) -> list[ConsideredEffect]:
     ranked = ranked_candidates(diagnosis)
     places = max(0, SHOWN_CANDIDATES - sum(candidate.chosen for candidate in ranked))
     others = [candidate for candidate in ranked if not candidate.chosen][:places]

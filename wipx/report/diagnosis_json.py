@@ -56,7 +56,7 @@ def _effect(effect: FoundEffect) -> dict[str, object]:
         },
         "present_probability": float(effect.present_probability),
         "share": float(effect.share),
-        "beyond_vocabulary": bool(effect.beyond),
+        "beyond_vocabulary": bool(effect.outside_vocabulary),
         "rivals": [
             {"name": rival.name, "separation": float(rival.separation), "parameters": _floats(rival.parameters)}
             for rival in effect.rivals
@@ -141,7 +141,7 @@ def _suspect(suspect: Suspect) -> dict[str, object]:
         "parameters": {symbol_of(number.name): _value(number) for number in suspect.parameters},
         "evidence": {
             "log_evidence_gain": float(suspect.log_evidence_gain),
-            "needed": float(suspect.needed),
+            "needed": float(suspect.required_gain),
             "heldout_gain": float(suspect.heldout_gain),
             "transfers": suspect.transfers,
         },

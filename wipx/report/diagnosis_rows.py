@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from wipx.core.diagnosis import Candidate, Diagnosis
+from wipx.core.diagnosis import ConsideredEffect, Diagnosis
 from wipx.core.results import Estimate
 from wipx.core.words import effect_in_words, site_in_words
 from wipx.report import diagnosis_words as words
@@ -81,7 +81,7 @@ class EffectRow:
         name: "site/kind".
         law: Its equation.
         source: Paper or book.
-        beyond: Whether the vocabulary lacks it.
+        outside_vocabulary: Whether the vocabulary lacks it.
         numbers: Its parameters.
         evidence: Nats.
         heldout_gain: Per cent.
@@ -95,7 +95,7 @@ class EffectRow:
     name: str
     law: str
     source: str
-    beyond: bool
+    outside_vocabulary: bool
     numbers: tuple[NumberRow, ...]
     evidence: str
     heldout_gain: str
@@ -125,7 +125,7 @@ class SuspectRow:
     named: bool
     numbers: tuple[NumberRow, ...]
     evidence: str
-    needed: str
+    required_gain: str
     heldout_gain: str
     sentence: str
 
@@ -175,7 +175,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[EffectRow]:
             name=effect.name,
             law=effect.law,
             source=effect.source,
-            beyond=effect.beyond,
+            outside_vocabulary=effect.outside_vocabulary,
             numbers=tuple(map(_number_row, effect.parameters)),
             evidence=words.nats(effect.log_evidence_gain),
             heldout_gain=words.percent(effect.heldout_gain),
@@ -218,7 +218,7 @@ def suspect_rows(diagnosis: Diagnosis) -> list[SuspectRow]:
             named=suspect.named,
             numbers=tuple(map(_number_row, suspect.parameters)),
             evidence=words.nats(suspect.log_evidence_gain),
-            needed=words.nats(suspect.needed),
+            required_gain=words.nats(suspect.required_gain),
             heldout_gain=words.percent(suspect.heldout_gain),
             sentence=suspect.sentence,
         )
@@ -249,7 +249,7 @@ def candidate_bars(diagnosis: Diagnosis) -> list[Bar]:
     return [_candidate_bar(candidate, full, kind) for candidate in ranked_candidates(diagnosis)]
 
 
-def _candidate_bar(candidate: Candidate, full: float, plant_kind: str) -> Bar:
+def _candidate_bar(candidate: ConsideredEffect, full: float, plant_kind: str) -> Bar:
     return Bar(
         label=words.capitalised(effect_in_words(candidate.name, plant_kind)),
         name=candidate.name,

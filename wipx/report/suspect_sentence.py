@@ -29,9 +29,9 @@ def _free_size(suspect: Suspect) -> str:
     numbers = ", ".join(map(value_in_words, suspect.parameters))
     if suspect.named:
         return f"named, {numbers}"
-    gain = f"gain {nats(suspect.log_evidence_gain)} nats of the {nats(suspect.needed)} needed"
+    gain = f"gain {nats(suspect.log_evidence_gain)} nats of the {nats(suspect.required_gain)} needed"
     if suspect.supported:
-        gain = f"gain {nats(suspect.log_evidence_gain)} nats, enough to be named ({nats(suspect.needed)} needed)"
+        gain = f"gain {nats(suspect.log_evidence_gain)} nats, enough to be named ({nats(suspect.required_gain)} needed)"
     if not suspect.in_place_of:
         return f"would be {numbers} and {gain}"
     others = " and ".join(suspect.in_place_of)

@@ -53,7 +53,9 @@ class Case:
     def vocabulary(self) -> tuple[str, ...]:
         """Effects of contract section 3 that can be added to the owner's model."""
         plant, present = self.nominal.plant, tuple(self.nominal.effects)
-        contract = (name for name, effect in vocabulary(plant).items() if not effect.beyond and name not in present)
+        contract = (
+            name for name, effect in vocabulary(plant).items() if not effect.outside_vocabulary and name not in present
+        )
         return tuple(name for name in contract if not excluded(name, present, plant))
 
 

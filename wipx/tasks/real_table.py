@@ -132,7 +132,7 @@ def asked(suspect: Suspect) -> str:
     """What came of a known effect: its free size, and of the authors' figure."""
     values = ", ".join(value_in_words(number) for number in suspect.parameters)
     others = f" in place of {' and '.join(suspect.in_place_of)}" if suspect.in_place_of else ""
-    evidence = f"gains {nats(suspect.log_evidence_gain)} nats of {nats(suspect.needed)}"
+    evidence = f"gains {nats(suspect.log_evidence_gain)} nats of {nats(suspect.required_gain)}"
     named = "named" if suspect.named else evidence if suspect.supported else "not named"
     if suspect.size is None:
         return f"{suspect.name}{others}: {'named' if suspect.named else evidence}; {values}"

@@ -6,8 +6,8 @@ import numpy as np
 
 from wipx.core.diagnosis import (
     Alternative,
-    Candidate,
     Combined,
+    ConsideredEffect,
     Diagnosis,
     FoundEffect,
     NextExperiment,
@@ -22,18 +22,18 @@ from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
 from wipx.diagnosis.decision.confirmation import Rest
-from wipx.diagnosis.decision.context import FAR_FROM_THE_FLOOR, FAR_OFF, Inquiry
+from wipx.diagnosis.decision.context import FAR_FROM_THE_FLOOR, FAR_OFF, Context
 from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
 from wipx.diagnosis.decision.held_out import Transfer, judged, transfer
 from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import inflation
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
 from wipx.diagnosis.residuals.discrepancy import curve_of
 from wipx.diagnosis.residuals.remaining_forces import horizon_errors, left_forces
 from wipx.diagnosis.residuals.residual_tests import Shape
-from wipx.diagnosis.selection.nested_laws import CONTAINS, simpler
+from wipx.diagnosis.selection.nested_laws import CONTAINS, reduced_effects
 from wipx.diagnosis.selection.search import Selection
 from wipx.effects.catalogue import effect_of
 from wipx.report.diagnosis_sentence import sentence
@@ -42,54 +42,54 @@ from wipx.sim.simulator import StateFeedback
 CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
 
 
-def answered(inquiry: Inquiry, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
+def answered(context: Context, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
     """Everything a person wants to know."""
-    nominal, fit = inquiry.setting.nominal, rest.fit
-    repeated = transfer(inquiry.fitter, fit)
-    judge = inquiry.judge
-    trusted = judge.tuned(nominal, inquiry.recordings)
+    nominal, fit = context.setting.nominal, rest.fit
+    repeated = transfer(context.fitter, fit)
+    judge = context.judge
+    trusted = judge.tuned(nominal, context.recordings)
     # where nothing is named, predictions learn how far to trust the model, as those of the nominal one do
     model = replace(fit.hypothesis.model, bandwidths=(judge.bandwidths or {}) if fit.effects else nominal.bandwidths)
-    held_out, traces = judged(judge, trusted, repeated.models, inquiry.recordings)
-    fitted, _ = judge.compare(trusted, model, inquiry.recordings, held_out=False)
-    ends = estimates(inquiry.fitter, fit, selection.nominal)
-    effects = _effects(inquiry, selection, rest, repeated, ends, shapes)
-    left = rest.significant or (fitted.times_the_floor > FAR_OFF and not inquiry.is_quiet(fit))
+    held_out, traces = judged(judge, trusted, repeated.models, context.recordings)
+    fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
+    ends = estimates(context.fitter, fit, selection.nominal)
+    effects = _effects(context, selection, rest, repeated, ends, shapes)
+    left = rest.significant or (fitted.times_the_floor > FAR_OFF and not context.is_quiet(fit))
     matters = left and fitted.times_the_floor > FAR_FROM_THE_FLOOR
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
-    unexplained = replace(_unexplained(inquiry, rest), significant=left)
-    as_one = () if rest.significant else combined(inquiry, selection, fit)
-    before, after = (inquiry.fitter.seen_by_row(each)[1] for each in (selection.nominal, fit))
-    location = located(inquiry.by_row, before, after, effects, unexplained.site)
+    unexplained = replace(_unexplained(context, rest), significant=left)
+    as_one = () if rest.significant else combined(context, selection, fit)
+    before, after = (context.fitter.seen_by_row(each)[1] for each in (selection.nominal, fit))
+    location = located(context.by_row, before, after, effects, unexplained.site)
     draft = Diagnosis(
         title="",
         source="",
-        units=_units(inquiry),
+        units=_units(context),
         verdict=verdict,
         sentence="",
         nominal=nominal,
         model=model,
         effects=effects,
-        corrected=tuple(e for e in ends if e.name in inquiry.setting.uncertainty),
+        corrected=tuple(e for e in ends if e.name in context.setting.uncertainty),
         location=location,
         fit=fitted,
         held_out=held_out,
         unexplained=unexplained,
         candidates=tuple(_in_hindsight(candidate, fit) for candidate in selection.considered),
-        bounds=bounds(selection.prospects_of(fit), inquiry.log.plant),
+        bounds=bounds(selection.candidates_for(fit), context.data.plant),
         weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
         traces=traces,
         notes=(),
         seconds=0.0,
         combined=as_one,
-        remainder=_remainder(inquiry, model, held_out, traces, matters=matters),
+        remainder=_remainder(context, model, held_out, traces, matters=matters),
     )
     return replace(draft, sentence=sentence(draft))
 
 
 def _remainder(
-    inquiry: Inquiry, model: Model, held_out: FitErrors, traces: tuple[Trace, ...], *, matters: bool
+    context: Context, model: Model, held_out: FitErrors, traces: tuple[Trace, ...], *, matters: bool
 ) -> Remainder:
     """How much stays, and what it looks like."""
     floors = {name: max(floor, 1e-15) for name, floor in held_out.noise_floor.items()}
@@ -98,17 +98,17 @@ def _remainder(
         {name: held_out.completed[name] / floor for name, floor in floors.items()},
         matters,
         horizon_errors(traces),
-        left_forces(inquiry.by_row.simulator, inquiry.log, inquiry.judge.noise, model),
+        left_forces(context.by_row.simulator, context.data, context.judge.noise, model),
     )
 
 
-def _in_hindsight(candidate: Candidate, fit: Fit) -> Candidate:
+def _in_hindsight(candidate: ConsideredEffect, fit: Fit) -> ConsideredEffect:
     """A candidate, chosen only if it is still part of the answer."""
     return replace(candidate, chosen=candidate.chosen and set(candidate.name.split(" + ")) <= set(fit.effects))
 
 
 def _effects(
-    inquiry: Inquiry,
+    context: Context,
     selection: Selection,
     rest: Rest,
     repeated: Transfer,
@@ -116,67 +116,67 @@ def _effects(
     shapes: list[Shape],
 ) -> tuple[FoundEffect, ...]:
     fit = rest.fit
-    reduced = {effect: inquiry.reduced(selection, fit, effect) for effect in fit.effects}
+    reduced = {effect: context.reduced(selection, fit, effect) for effect in fit.effects}
     gains = {effect: max(selection.evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
     total = sum(gains.values()) or 1.0
     found = []
     for effect in sorted(fit.effects, key=lambda e: -gains[e]):
-        law = effect_of(effect, inquiry.log.plant)
-        rivals, probability = _rivals(inquiry, selection, fit, effect)
+        law = effect_of(effect, context.data.plant)
+        rivals, probability = _rivals(context, selection, fit, effect)
         found.append(
             FoundEffect(
                 effect,
                 law.law,
                 law.source,
-                law.beyond,
+                law.outside_vocabulary,
                 tuple(e for e in ends if e.name.startswith(f"{effect}.")),
                 tuple(rival.name for rival in rivals if rival.separation < ALIKE),
                 rivals,
                 gains[effect],
-                inquiry.heldout_gain(repeated, reduced[effect]),
+                context.heldout_gain(repeated, reduced[effect]),
                 probability,
                 gains[effect] / total,
-                law_curve(inquiry.by_row, _taken_out(inquiry, fit, effect), fit, effect, shapes),
+                law_curve(context.by_row, _taken_out(context, fit, effect), fit, effect, shapes),
             )
         )
     return tuple(found)
 
 
-def _taken_out(inquiry: Inquiry, fit: Fit, effect: str) -> Fit:
+def _taken_out(context: Context, fit: Fit, effect: str) -> Fit:
     """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
     rest = tuple(e for e in fit.effects if e != effect)
-    hypothesis = Hypothesis.of(inquiry.setting_of(fit), rest, fit.hypothesis.values)
-    found = inquiry.by_row.fit(hypothesis, inquiry.fitter.seen_by_row(fit)[1].levels, steps=0)
+    hypothesis = Hypothesis.of(context.setting_of(fit), rest, fit.hypothesis.values)
+    found = context.by_row.fit(hypothesis, context.fitter.seen_by_row(fit)[1].levels, steps=0)
     return replace(found, jacobian=found.jacobian[:, :0])
 
 
-def _rivals(inquiry: Inquiry, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
+def _rivals(context: Context, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
     """Effects that could stand in the place of one, the closest first, and the probability of its name."""
     overstated = inflation(fit, fit.hypothesis.parameters_of(effect))
     rivals, weights = [], []
     rest = set(fit.effects) - {effect}
-    base = inquiry.reduced(selection, fit, effect)
+    base = context.reduced(selection, fit, effect)
     for other in selection.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
-        if name == effect or _is_richer(other, name, effect, inquiry.log):
+        if name == effect or _is_richer(other, name, effect, context.data):
             continue
-        starts = _starts(inquiry, fit, other, effect, name)
-        start = inquiry.fitter.likeliest(starts, fit.levels, 1)[0]
+        starts = _starts(context, fit, other, effect, name)
+        start = context.fitter.likeliest(starts, fit.levels, 1)[0]
         close = selection.evidence(other, fit) < max(
-            inquiry.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
+            context.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
         )
         if close or start is not starts[0]:
-            again = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels))
+            again = context.fitter.polished(context.fitter.fit(start, fit.levels))
             other = max(other, again, key=lambda found: found.log_likelihood)
         loss = selection.evidence(base, fit) - selection.evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
-        rivals.append(Alternative(name, inquiry.fitter.separation(fit, other, loss, overstated), values))
+        rivals.append(Alternative(name, context.fitter.separation(fit, other, loss, overstated), values))
         weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
     rivals.sort(key=lambda rival: rival.separation)
     return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 
 
-def _starts(inquiry: Inquiry, fit: Fit, rival: Fit, effect: str, name: str) -> list[Hypothesis]:
+def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> list[Hypothesis]:
     """A rival as found; with the answer's values of what they share; with the value of the effect it replaces too.
 
     The last is the best for two effects of one equation: a bias of the angle, a centre of mass beside the axis.
@@ -188,33 +188,35 @@ def _starts(inquiry: Inquiry, fit: Fit, rival: Fit, effect: str, name: str) -> l
     theirs = [p for p in fit.hypothesis.space.free if p.name.startswith(f"{effect}.")]
     if len(mine) == len(theirs) == 1 and mine[0].unit == theirs[0].unit:
         values.append({**shared, mine[0].name: shared[theirs[0].name]})
-    return [Hypothesis.of(inquiry.setting_of(fit), rival.effects, each) for each in values]
+    return [Hypothesis.of(context.setting_of(fit), rival.effects, each) for each in values]
 
 
-def _is_richer(other: Fit, name: str, effect: str, log: Log) -> bool:
+def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
     contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
-    replaced = simpler(other, log)
+    replaced = reduced_effects(other, data)
     return contained == effect or (replaced is not None and effect in replaced)
 
 
-def _unexplained(inquiry: Inquiry, rest: Rest) -> Unexplained:
-    laws = {name: effect_of(name, inquiry.log.plant) for name in rest.fit.effects}
-    beyond = [name for name, law in laws.items() if law.beyond and not inquiry.fitter.looks_for(name, law)]
-    if rest.significant and beyond:
-        words = " and ".join(effect_in_words(name, inquiry.log.plant.kind) for name in beyond)
-        return Unexplained(True, rest.p_value, beyond[0].partition("/")[0], words, rest.resembles, None)
+def _unexplained(context: Context, rest: Rest) -> Unexplained:
+    laws = {name: effect_of(name, context.data.plant) for name in rest.fit.effects}
+    outside_vocabulary = [
+        name for name, law in laws.items() if law.outside_vocabulary and not context.fitter.looks_for(name, law)
+    ]
+    if rest.significant and outside_vocabulary:
+        words = " and ".join(effect_in_words(name, context.data.plant.kind) for name in outside_vocabulary)
+        return Unexplained(True, rest.p_value, outside_vocabulary[0].partition("/")[0], words, rest.resembles, None)
     if not rest.significant or rest.strongest is None:
         return Unexplained(False, rest.p_value, None, "", (), None)
     shape = rest.strongest.shape
-    site = inquiry.log.plant.joints[shape.joint]
+    site = context.data.plant.joints[shape.joint]
     words = {
         "force": f"a force over {shape.signal} on {site}",
         "gain": "an actuator gain that drifts over time",
         "friction": f"dry friction on {site} that changes with {shape.signal}",
         "resonance": f"something that swings with {site} at about {shape.signal} Hz",
     }[shape.kind]
-    curve = curve_of(shape, rest.fit, rest.spread, inquiry.log) if len(rest.spread) else None
+    curve = curve_of(shape, rest.fit, rest.spread, context.data) if len(rest.spread) else None
     return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
 
 
@@ -240,13 +242,13 @@ def _as_one(laws: tuple[Combined, ...], plant_kind: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _units(inquiry: Inquiry) -> dict[str, str]:
-    plant = inquiry.log.plant
+def _units(context: Context) -> dict[str, str]:
+    plant = context.data.plant
     return {name: plant.unit_of(name) for name in (*plant.coordinates, *plant.rates, *plant.commands)} | {"t": "s"}
 
 
 def proposed(
-    inquiry: Inquiry,
+    context: Context,
     selection: Selection,
     fit: Fit,
     answer: Diagnosis,
@@ -265,9 +267,9 @@ def proposed(
     if not rivals and not weak:
         return None
     questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
-    seen = tuple(inquiry.fitter.seen_by_row(rival)[1] for rival in rivals)
+    seen = tuple(context.fitter.seen_by_row(rival)[1] for rival in rivals)
     question = Question(f"Open: {', '.join(questions)}.", seen, weak)
-    closed, rate = feedback if feedback is not None else (None, inquiry.recordings[0].rate)
-    simulator = inquiry.by_row.simulator
-    answered_by_row = inquiry.fitter.seen_by_row(fit)[1]
-    return next_experiment(question, answered_by_row, inquiry.setting, inquiry.log, simulator, closed, rate, rng)
+    closed, rate = feedback if feedback is not None else (None, context.recordings[0].rate)
+    simulator = context.by_row.simulator
+    answered_by_row = context.fitter.seen_by_row(fit)[1]
+    return next_experiment(question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng)

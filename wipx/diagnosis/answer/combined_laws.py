@@ -5,7 +5,7 @@ say so.
 """
 
 from wipx.core.diagnosis import Combined
-from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.search import Selection
@@ -14,7 +14,7 @@ CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a 
 TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
 
-def combined(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Combined, ...]:
+def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined, ...]:
     """Frictions that differ by direction which explain a Coulomb friction and a constant force of a fit as well."""
     found = []
     for friction in (effect for effect in fit.effects if effect.endswith("/coulomb")):
@@ -23,8 +23,8 @@ def combined(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Combined
             level = fit.hypothesis.values[f"{friction}.F_c"]
             rest = tuple(effect for effect in fit.effects if effect not in (friction, constant))
             start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
-            hypothesis = Hypothesis.of(inquiry.setting, (*rest, name), start)
-            other = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, inquiry.fitter.loosened(fit)))
+            hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
+            other = context.fitter.polished(context.fitter.fit(hypothesis, context.fitter.loosened(fit)))
             lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
             if lead > -TOLD_APART:
                 values = other.hypothesis.values

@@ -9,7 +9,7 @@ from wipx.core.words import effect_in_words
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.residuals.discrepancy import process_mean
-from wipx.diagnosis.residuals.residual_tests import Shape, leftovers
+from wipx.diagnosis.residuals.residual_tests import Shape, residual_tests
 from wipx.effects.catalogue import effect_of
 
 POINTS = 201
@@ -18,7 +18,7 @@ DRIVE = ("offset", "dead_zone", "gain", "saturation")  # in the order in which t
 
 def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
     """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
-    plant = fitter.log.plant
+    plant = fitter.data.plant
     steady = effect_of(effect, plant).steady
     if steady is None:
         return None
@@ -29,7 +29,7 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
     if shape is None:
         return None
     at = np.unique(np.concatenate([np.linspace(shape.knots[0], shape.knots[-1], POINTS), [-1e-9, 1e-9]]))
-    left = leftovers(fitter, reduced, [shape])[0]
+    left = residual_tests(fitter, reduced, [shape])[0]
     force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
     return Curve(
         effect_in_words(effect, plant.kind),
@@ -45,7 +45,7 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
 
 
 def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
-    plant = fitter.log.plant
+    plant = fitter.data.plant
     if steady.over == "rate":
         return plant.rates[joint]
     if steady.over == "coordinate":

@@ -14,7 +14,7 @@ from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import motion_of
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 
 BINS = 24  # of a map, along each axis
 RUN_BINS = 40  # along each recording
@@ -43,10 +43,10 @@ def located(
     if not effects and rest is None:
         return Location({}, (), (), None)
     excess = excess_of(fitter, nominal, completed)
-    log = fitter.log
+    data = fitter.data
     signals = motion_of(fitter, nominal)
-    regions = _named_regions(effects, signals, excess, log) or _found_regions(signals, excess, log)
-    return Location(_sites(effects, rest), regions, _periods(effects, excess, log), _map(log, signals, excess))
+    regions = _named_regions(effects, signals, excess, data) or _found_regions(signals, excess, data)
+    return Location(_sites(effects, rest), regions, _periods(effects, excess, data), _map(data, signals, excess))
 
 
 def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, float]:
@@ -61,7 +61,7 @@ def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, f
 
 
 def _named_regions(
-    effects: tuple[FoundEffect, ...], signals: Mapping[str, np.ndarray], excess: np.ndarray, log: Log
+    effects: tuple[FoundEffect, ...], signals: Mapping[str, np.ndarray], excess: np.ndarray, data: RecordingBatch
 ) -> tuple[Region, ...]:
     """The stretch of the rail of a sticky spot."""
     regions = []
@@ -69,38 +69,38 @@ def _named_regions(
         if effect.name.endswith("/sticky_spot"):
             low, high = (p.value for p in effect.parameters if p.name.endswith((".lo", ".hi")))
             inside = (signals["x"] >= low) & (signals["x"] <= high)
-            regions.append(Region("x", low, high, _share(excess, inside, log)))
+            regions.append(Region("x", low, high, _share(excess, inside, data)))
     return tuple(regions)
 
 
-def _periods(effects: tuple[FoundEffect, ...], excess: np.ndarray, log: Log) -> tuple[Period, ...]:
+def _periods(effects: tuple[FoundEffect, ...], excess: np.ndarray, data: RecordingBatch) -> tuple[Period, ...]:
     """From the payload's coming to the end of each recording."""
     periods = []
     for effect in effects:
         if effect.name.endswith("/payload_event"):
             begin = next(p.value for p in effect.parameters if p.name.endswith(".t0"))
-            for r, recording in enumerate(log.recordings):
+            for r, recording in enumerate(data.recordings):
                 end = float(recording.t[-1])
-                column = np.zeros_like(log.rows)
-                column[:, r] = log.inputs.t[:, r] >= begin
+                column = np.zeros_like(data.rows)
+                column[:, r] = data.inputs.t[:, r] >= begin
                 only = np.where(np.arange(excess.shape[1]) == r, excess, 0.0)
                 if begin < end:
-                    periods.append(Period(recording.name, begin, end, _share(only, column, log)))
+                    periods.append(Period(recording.name, begin, end, _share(only, column, data)))
     return tuple(periods)
 
 
-def _share(excess: np.ndarray, inside: np.ndarray, log: Log) -> float:
-    total = float(excess[log.counted].sum())
-    return float(np.clip(excess[log.counted & inside].sum() / total, 0.0, 1.0)) if total > 0.0 else 0.0
+def _share(excess: np.ndarray, inside: np.ndarray, data: RecordingBatch) -> float:
+    total = float(excess[data.counted].sum())
+    return float(np.clip(excess[data.counted & inside].sum() / total, 0.0, 1.0)) if total > 0.0 else 0.0
 
 
-def _found_regions(signals: Mapping[str, np.ndarray], excess: np.ndarray, log: Log) -> tuple[Region, ...]:
+def _found_regions(signals: Mapping[str, np.ndarray], excess: np.ndarray, data: RecordingBatch) -> tuple[Region, ...]:
     """The interval of a signal that holds most of the excess in few rows, if one does."""
     best: tuple[float, Region] | None = None
     for name, values in signals.items():
         if name == "t":
             continue
-        found = _interval(name, values[log.counted], excess[log.counted])
+        found = _interval(name, values[data.counted], excess[data.counted])
         if found is not None and (best is None or found[0] > best[0]):
             best = found
     return () if best is None else (best[1],)
@@ -126,10 +126,10 @@ def _interval(name: str, values: np.ndarray, excess: np.ndarray) -> tuple[float,
     return best
 
 
-def _map(log: Log, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> ErrorMap:
-    plant = log.plant
+def _map(data: RecordingBatch, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> ErrorMap:
+    plant = data.plant
     names = _axes(plant)
-    counted = log.counted
+    counted = data.counted
     values = [signals[name][counted] for name in names]
     ends = [np.quantile(v, (0.002, 0.998)) for v in values]
     edges = [np.linspace(low, high, BINS + 1) for low, high in ends]
@@ -138,8 +138,8 @@ def _map(log: Log, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> Err
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(counts > 0, sums / counts, np.nan)
     times, along = [], []
-    for r in range(len(log.recordings)):
-        t = log.inputs.t[counted[:, r], r]
+    for r in range(len(data.recordings)):
+        t = data.inputs.t[counted[:, r], r]
         bounds = np.linspace(t[0], t[-1] + 1e-9, RUN_BINS + 1)
         total = np.histogram(t, bounds, weights=excess[counted[:, r], r])[0]
         times.append(0.5 * (bounds[1:] + bounds[:-1]))
@@ -149,7 +149,7 @@ def _map(log: Log, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> Err
         (plant.unit_of(names[0]), plant.unit_of(names[1])),
         (edges[0], edges[1]),
         mean,
-        tuple(r.name for r in log.recordings),
+        tuple(r.name for r in data.recordings),
         tuple(times),
         tuple(along),
     )

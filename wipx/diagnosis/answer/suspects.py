@@ -17,16 +17,16 @@ from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.parameters import Scales
 from wipx.core.results import Estimate
-from wipx.diagnosis.candidates.screening import prospects
+from wipx.diagnosis.candidates.screening import candidates_beside
 from wipx.diagnosis.decision.confirmation import Rest
-from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import NINETY_FIVE, estimates
 from wipx.diagnosis.decision.held_out import transfer
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.residuals.discrepancy import with_curve
-from wipx.diagnosis.selection.nested_laws import CONTAINS, simple_values
+from wipx.diagnosis.selection.nested_laws import CONTAINS, reduced_values
 from wipx.diagnosis.selection.search import STARTS, Selection
 from wipx.effects.catalogue import check_together, effect_of, vocabulary
 from wipx.recordings.model_file import model_from_mapping
@@ -81,25 +81,25 @@ def _check_bounds(name: str, effect: Effect, values: Mapping[str, float], scales
 
 
 def asked(
-    inquiry: Inquiry, selection: Selection, rest: Rest, answer: Diagnosis, suspects: Suspected
+    context: Context, selection: Selection, rest: Rest, answer: Diagnosis, suspects: Suspected
 ) -> tuple[Suspect, ...]:
     """What the recordings say of each suspect.
 
     Args:
-        inquiry: The means.
+        context: The means.
         selection: The search that led to the answer.
         rest: The answer's fit.
         answer: The answer, complete.
         suspects: As `check_suspects` returns them.
     """
-    return tuple(_Asked(inquiry, selection, rest, answer, name).about(values) for name, values in suspects.items())
+    return tuple(_Asked(context, selection, rest, answer, name).about(values) for name, values in suspects.items())
 
 
 @dataclass(frozen=True)
 class _Asked:
     """One suspect and what it is compared with."""
 
-    inquiry: Inquiry
+    context: Context
     selection: Selection
     rest: Rest
     answer: Diagnosis
@@ -107,25 +107,25 @@ class _Asked:
 
     def about(self, values: Mapping[str, float]) -> Suspect:
         """What the recordings say, also of these values by symbol where there are any."""
-        inquiry, selection = self.inquiry, self.selection
+        context, selection = self.context, self.selection
         named = self.name in self.rest.fit.effects
         replaced = () if named else self.making_room()
         gone = (self.name,) if named else replaced
-        base = inquiry.reduced(selection, self.rest.fit, *gone) if gone else self.rest.fit
+        base = context.reduced(selection, self.rest.fit, *gone) if gone else self.rest.fit
         free = self.rest.fit if named else self.free_size(base, values)
         base = self.caught_up(base, free)
         best = self.caught_up(self.rest.fit, free)
-        repeated = transfer(inquiry.fitter, free)
-        known = inquiry.fitter.by_recording(base, base.white)
-        numbers = estimates(inquiry.fitter, free, selection.nominal)
+        repeated = transfer(context.fitter, free)
+        known = context.fitter.by_recording(base, base.white)
+        numbers = estimates(context.fitter, free, selection.nominal)
         suspect = Suspect(
             name=self.name,
             named=named,
             in_place_of=replaced,
             parameters=tuple(e for e in numbers if e.name.startswith(f"{self.name}.")),
             log_evidence_gain=selection.evidence(base, free),
-            needed=selection.needed(base, free),
-            heldout_gain=inquiry.heldout_gain(repeated, base),
+            required_gain=selection.required_gain(base, free),
+            heldout_gain=context.heldout_gain(repeated, base),
             transfers=bool(repeated.likelihoods.sum() > known.sum()),
             loss=0.0 if named else -selection.evidence(best, free),
             size=None,
@@ -138,7 +138,7 @@ class _Asked:
 
     def making_room(self) -> tuple[str, ...]:
         """Effects of the answer that cannot stand beside the suspect."""
-        known = vocabulary(self.inquiry.log.plant)
+        known = vocabulary(self.context.data.plant)
         site, _, kind = self.name.partition("/")
         found = []
         for effect in self.answer.effects:
@@ -152,22 +152,22 @@ class _Asked:
     def free_size(self, base: Fit, values: Mapping[str, float]) -> Fit:
         """The fit of a base with the suspect, its size free."""
         known = base.hypothesis.values
-        if effect_of(self.name, self.inquiry.log.plant).beyond:
-            looked_at = prospects(self.inquiry.fitter, self.inquiry.setting, base, beyond=True)
+        if effect_of(self.name, self.context.data.plant).outside_vocabulary:
+            looked_at = candidates_beside(self.context.fitter, self.context.setting, base, outside_vocabulary=True)
         else:
-            looked_at = self.selection.prospects_of(base)
-        promising = [prospect.values for prospect in looked_at if prospect.effect == self.name][:STARTS]
+            looked_at = self.selection.candidates_for(base)
+        promising = [candidate.values for candidate in looked_at if candidate.effect == self.name][:STARTS]
         suspected = {f"{self.name}.{symbol}": value for symbol, value in values.items()}
-        simple = {k: v for k, v in simple_values(self.rest.fit).items() if k.startswith(f"{self.name}.")}
+        simple = {k: v for k, v in reduced_values(self.rest.fit).items() if k.startswith(f"{self.name}.")}
         starts = [{**known, **start} for start in (*promising, suspected, simple) if start] or [known]
-        return self.likeliest(self.inquiry.setting, (*base.effects, self.name), starts, base.levels)
+        return self.likeliest(self.context.setting, (*base.effects, self.name), starts, base.levels)
 
     def of_size(
         self, suspect: Suspect, values: Mapping[str, float], free: Fit, best: Fit, limit: float
     ) -> SuspectedSize:
         """What comes of a suspected size, by symbol."""
-        inquiry, selection = self.inquiry, self.selection
-        setting = inquiry.setting
+        context, selection = self.context, self.selection
+        setting = context.setting
         nominal = setting.nominal.with_effects({self.name: values})
         others = tuple(effect for effect in free.effects if effect != self.name)
         starts = [free.hypothesis.values, best.hypothesis.values]
@@ -175,7 +175,7 @@ class _Asked:
         loss, loss_to_free = -selection.evidence(best, held), -selection.evidence(free, held)
         against_free = suspect.supported or bool(suspect.in_place_of)
         inside = all(_covers(number, values) for number in suspect.parameters)
-        ours, theirs = (inquiry.heldout_error(transfer(inquiry.fitter, fit)) for fit in (held, self.rest.fit))
+        ours, theirs = (context.heldout_error(transfer(context.fitter, fit)) for fit in (held, self.rest.fit))
         return SuspectedSize(
             dict(values),
             loss,
@@ -190,22 +190,22 @@ class _Asked:
         self, setting: Setting, effects: tuple[str, ...], starts: list[dict[str, float]], levels: NoiseLevels
     ) -> Fit:
         """The likeliest fit of some effects; a curve that stands in is taken as it is, or drawn anew beside them."""
-        fitter, rest = self.inquiry.fitter, self.rest
-        curves = self.inquiry.setting_of(rest.fit).nominal.effects
+        fitter, rest = self.context.fitter, self.rest
+        curves = self.context.setting_of(rest.fit).nominal.effects
         kept = replace(setting, nominal=setting.nominal.with_effects({**curves, **setting.nominal.effects}))
         fits = [fitter.fit(Hypothesis.of(kept, effects, start), levels, steps=5) for start in starts]
         best = fitter.polished(max(fits, key=lambda fit: fit.log_likelihood))
         if rest.strongest is None or not len(rest.spread):
             return best
         without = fitter.fit(Hypothesis.of(setting, effects, best.hypothesis.values), best.levels)
-        anew, _ = with_curve(self.inquiry.by_row, setting, without, rest.strongest)
+        anew, _ = with_curve(self.context.by_row, setting, without, rest.strongest)
         return max(best, anew, key=lambda fit: fit.log_likelihood)
 
     def caught_up(self, fit: Fit, other: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of another."""
         if fit is other:
             return fit
-        again = self.inquiry.fitter.polished(self.inquiry.fitter.fit(fit.hypothesis, other.levels), rounds=2)
+        again = self.context.fitter.polished(self.context.fitter.fit(fit.hypothesis, other.levels), rounds=2)
         return max(fit, again, key=lambda one: one.log_likelihood)
 
 

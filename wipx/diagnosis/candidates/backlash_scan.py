@@ -34,10 +34,10 @@ def plays(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
     Returns:
         Shape (GUESSES, 5).
     """
-    log = fitter.log
-    joint = log.plant.joints.index(log.plant.actuated[0])
-    way = float(np.ptp(log.measured[:, joint][log.rows]))
-    inertia = 1.0 / float(np.median(fitter.follower.linear.b[:, joint, joint]))
+    data = fitter.data
+    joint = data.plant.joints.index(data.plant.actuated[0])
+    way = float(np.ptp(data.measured[:, joint][data.rows]))
+    inertia = 1.0 / float(np.median(fitter.innovations_model.linear.b[:, joint, joint]))
     guesses = np.array(
         [
             (gap * way, share * inertia, share * inertia * slowing, returned, CONTACT_TIME)

@@ -41,16 +41,16 @@ def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.nd
 
 
 def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    log = fitter.log
-    plant = log.plant
+    data = fitter.data
+    plant = data.plant
     motion = motion_of(fitter, fit)
     joints = [plant.joints.index(site) for site in plant.actuated]
     model = fit.hypothesis.model
     gain = model.parameters["input_gain"] * model.effects.get("actuator/gain", {}).get("k", 1.0)
-    forces = [np.where(log.rows, gain * motion[command], 0.0) for command in plant.commands]
+    forces = [np.where(data.rows, gain * motion[command], 0.0) for command in plant.commands]
     rates = [motion[plant.rates[joint]] for joint in joints]
     largest = max(float(np.abs(force).max()) for force in forces)
-    fastest = max(1e-9, *(float(np.quantile(np.abs(rate[log.counted]), FAST)) for rate in rates))
+    fastest = max(1e-9, *(float(np.quantile(np.abs(rate[data.counted]), FAST)) for rate in rates))
     pairs = np.array([(limit * largest, speed * fastest) for speed in speeds for limit in LIMITS])
     left = left_of(fit, basis)
     gains = np.zeros(len(pairs))

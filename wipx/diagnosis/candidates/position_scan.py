@@ -28,8 +28,8 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
     """
-    plant = fitter.log.plant
-    rows = fitter.log.rows
+    plant = fitter.data.plant
+    rows = fitter.data.rows
     motion = motion_of(fitter, fit)
     radius = fit.hypothesis.model.parameters["wheel_radius"] if "wheel_radius" in plant.parameters else 1.0
     joints = [plant.joints.index(site) for site in plant.actuated]
@@ -64,12 +64,12 @@ def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.nd
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
     """
-    log = fitter.log
+    data = fitter.data
     motion = motion_of(fitter, fit)
-    x, rate = motion[log.plant.coordinates[0]], motion[log.plant.rates[0]]
-    edges = np.linspace(x[log.rows].min(), x[log.rows].max(), BINS + 1)
-    inside = (x >= edges[:-1, None, None]) & (x < edges[1:, None, None]) & log.rows
-    slopes = response(fitter, fit, 0, np.where(inside, -direction(rate, log.rows), 0.0))
+    x, rate = motion[data.plant.coordinates[0]], motion[data.plant.rates[0]]
+    edges = np.linspace(x[data.rows].min(), x[data.rows].max(), BINS + 1)
+    inside = (x >= edges[:-1, None, None]) & (x < edges[1:, None, None]) & data.rows
+    slopes = response(fitter, fit, 0, np.where(inside, -direction(rate, data.rows), 0.0))
     slopes = slopes - basis @ (basis.T @ slopes)
     # A spot is some bins in a row: sums over it are differences of sums from the beginning.
     score = np.concatenate([[0.0], np.cumsum(slopes.T @ left_of(fit, basis))])

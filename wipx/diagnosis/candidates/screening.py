@@ -38,7 +38,7 @@ AS_THEY_ARE = ("backlash",)  # guesses that no dose makes better: what a gap doe
 
 
 @dataclass(frozen=True)
-class Prospect:
+class Candidate:
     """An effect that may be missing.
 
     Attributes:
@@ -56,23 +56,25 @@ class Prospect:
     deviation: float
 
 
-def prospects(fitter: Fitter, setting: Setting, fit: Fit, *, beyond: bool = False) -> list[Prospect]:
+def candidates_beside(
+    fitter: Fitter, setting: Setting, fit: Fit, *, outside_vocabulary: bool = False
+) -> list[Candidate]:
     """Where to start for every effect that could be added to a fit, best first.
 
     Args:
         fitter: Fits and simulates.
         setting: The robot.
         fit: What is already explained.
-        beyond: Whether to look at the effects that contract section 3 lacks instead of those it has.
+        outside_vocabulary: Whether to look at the effects that contract section 3 lacks instead of those it has.
     """
     known = vocabulary(setting.nominal.plant)
     present = set(fit.hypothesis.model.effects)
-    found: list[Prospect] = []
+    found: list[Candidate] = []
     for name, effect in known.items():
-        wanted = effect.beyond if beyond else fitter.looks_for(name, effect)
+        wanted = effect.outside_vocabulary if outside_vocabulary else fitter.looks_for(name, effect)
         if wanted and not _excluded(name, effect, present, known):
-            found += prospects_of_effect(fitter, setting, fit, name)
-    return sorted(found, key=lambda prospect: -prospect.gain)
+            found += candidates_of_effect(fitter, setting, fit, name)
+    return sorted(found, key=lambda candidate: -candidate.gain)
 
 
 def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, Effect]) -> bool:
@@ -84,13 +86,13 @@ def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, 
     return name in present or bool(others & present) or bool(excluding)
 
 
-def doses(effect: Effect, scales: Scales) -> np.ndarray:
+def perturbations(effect: Effect, scales: Scales) -> np.ndarray:
     """Values of an effect's parameters at which it is looked for, shape (atoms, parameters) [SI]."""
     axes = [[g * scales.of(p.dimension) for g in (p.grid or (p.start,))] for p in effect.parameters]
     return np.array(list(product(*axes)))
 
 
-def undosed(setting: Setting, name: str) -> list[dict[str, float]]:
+def unscaled(setting: Setting, name: str) -> list[dict[str, float]]:
     """The doses of an effect as they are, where screening scales all of its numbers; none where it scales not all.
 
     What an effect does is not always proportional to it: a late sensor also asks for another observer.
@@ -99,11 +101,11 @@ def undosed(setting: Setting, name: str) -> list[dict[str, float]]:
     if len(effect.linear_in) < len(effect.parameters):
         return []
     names = [f"{name}.{p.name}" for p in effect.parameters]
-    atoms = doses(effect, setting.scales[name.partition("/")[0]]).tolist()
+    atoms = perturbations(effect, setting.scales[name.partition("/")[0]]).tolist()
     return [dict(zip(names, atom, strict=True)) for atom in atoms]
 
 
-def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> list[Prospect]:
+def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> list[Candidate]:
     """Where to start for one effect that could be added to a fit."""
     effect = vocabulary(setting.nominal.plant)[name]
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
@@ -113,7 +115,9 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
     scan = SCANS.get(effect.kind)
-    atoms = doses(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
+    atoms = (
+        perturbations(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
+    )
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
     low, high = _bounds(setting, name, effect)
@@ -133,7 +137,7 @@ def prospects_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -
             estimate = neutral[0] + best * (atom[0] - neutral[0])
             deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
             start = dict(zip(names, values.tolist(), strict=True))
-            found.append(Prospect(name, float(gain), start, float(estimate), float(deviation)))
+            found.append(Candidate(name, float(gain), start, float(estimate), float(deviation)))
     return found
 
 

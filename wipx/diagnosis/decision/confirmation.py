@@ -6,25 +6,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from wipx.core.diagnosis import Candidate
-from wipx.diagnosis.candidates.screening import prospects
-from wipx.diagnosis.decision.context import FAR_OFF, TOLERATED, Inquiry
+from wipx.core.diagnosis import ConsideredEffect
+from wipx.diagnosis.candidates.screening import candidates_beside
+from wipx.diagnosis.decision.context import FAR_OFF, TOLERATED, Context
 from wipx.diagnosis.decision.estimates import deviations
 from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.discrepancy import with_curve
-from wipx.diagnosis.residuals.residual_tests import Leftover, Shape, leftovers, shapes_of
-from wipx.diagnosis.selection.nested_laws import richer
+from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests, shapes_of
+from wipx.diagnosis.selection.nested_laws import extended_effects
 from wipx.diagnosis.selection.search import Selection
 from wipx.effects.catalogue import effect_of
 
-SIGNIFICANT = 1e-4  # p value, corrected, of a leftover where nothing is named
+SIGNIFICANT = 1e-4  # p value, corrected, of a residual where nothing is named
 BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more of it is less of a surprise
-LEFTOVER_GAIN = 20.0  # nats that a leftover must be worth
+RESIDUAL_GAIN = 20.0  # nats that a residual must be worth
 SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has nine
-LEFTOVER_SHARE = 0.02  # and of what is explained
+RESIDUAL_SHARE = 0.02  # and of what is explained
 BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
 DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
 CERTAIN = 3.0  # standard deviations by which a size must differ from nothing
@@ -50,81 +50,81 @@ class Rest:
     """
 
     fit: Fit
-    strongest: Leftover | None
+    strongest: Residual | None
     p_value: float
     significant: bool
     resembles: tuple[str, ...]
     spread: np.ndarray
 
 
-def decided(inquiry: Inquiry, selection: Selection, chosen: Fit) -> tuple[Rest, list[Shape]]:
+def decided(context: Context, selection: Selection, chosen: Fit) -> tuple[Rest, list[Shape]]:
     """What is kept of the effects that the selection chose, what they leave over, and the shapes it was looked for in.
 
     Small effects that held-out predictions do not show are kept where something is left without them and nothing
     with them: what is left is then no misfit of another law.
     """
     told = len(selection.considered)
-    kept = confirmed(inquiry, selection, chosen)
-    shapes = shapes_of(inquiry.by_row, kept)
-    rest = remaining(inquiry, selection, kept, shapes)
+    kept = confirmed(context, selection, chosen)
+    shapes = shapes_of(context.by_row, kept)
+    rest = remaining(context, selection, kept, shapes)
     if not rest.significant or len(kept.effects) == len(chosen.effects):
         return rest, shapes
     dropped = selection.considered[told:]
     del selection.considered[told:]
-    more = confirmed(inquiry, selection, chosen, visible=-np.inf)
+    more = confirmed(context, selection, chosen, visible=-np.inf)
     if set(more.effects) > set(kept.effects):
-        whole = remaining(inquiry, selection, more, shapes)
+        whole = remaining(context, selection, more, shapes)
         if not whole.significant:
             return whole, shapes
     selection.considered[told:] = dropped
     return rest, shapes
 
 
-def confirmed(inquiry: Inquiry, selection: Selection, fit: Fit, visible: float = VISIBLE) -> Fit:
+def confirmed(context: Context, selection: Selection, fit: Fit, visible: float = VISIBLE) -> Fit:
     """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
 
     Args:
-        inquiry: The means.
+        context: The means.
         selection: The search that chose the effects.
         fit: Of the effects.
         visible: Share of the squared error of held-out predictions that a small effect must remove.
     """
     if not fit.effects:
         return fit
-    repeated = transfer(inquiry.fitter, fit)
-    predicted = np.concatenate(inquiry.judge.predict(fit.hypothesis.model, inquiry.recordings))
+    repeated = transfer(context.fitter, fit)
+    predicted = np.concatenate(context.judge.predict(fit.hypothesis.model, context.recordings))
     without = {effect: selection.without(fit, effect) for effect in fit.effects}
     gains = {effect: selection.evidence(without[effect], fit) for effect in fit.effects}
     leading = max(gains, key=lambda effect: gains[effect])
-    uncertain = _uncertain(inquiry, selection, fit)
+    uncertain = _uncertain(context, selection, fit)
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
-        change = predicted - np.concatenate(inquiry.judge.predict(reduced.hypothesis.model, inquiry.recordings))
-        known = inquiry.fitter.by_recording(reduced, reduced.white)
+        change = predicted - np.concatenate(context.judge.predict(reduced.hypothesis.model, context.recordings))
+        known = context.fitter.by_recording(reduced, reduced.white)
         # An effect that gains much and does not transfer points to something else that is missing.
-        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * inquiry.judge.noise):
+        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * context.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in uncertain and (gain < SMALL_PRINT or not nonsmooth_search.is_rough(fit)):
+        elif effect in uncertain and (gain < SMALL_PRINT or not nonsmooth_search.is_non_smooth(fit)):
             reason = "has a size that cannot be told from zero"
         elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and inquiry.heldout_gain(repeated, reduced) < visible:
+        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and context.heldout_gain(repeated, reduced) < visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
-            rival = _rival_that_transfers(inquiry, selection, fit, effect, repeated, gain)
+            rival = _rival_that_transfers(context, selection, fit, effect, repeated, gain)
             if rival is not None:
                 reason = "held-out recordings contradict it, and not what is in its place"
-                selection.considered.append(Candidate(effect, gain, False, reason))
-                return confirmed(inquiry, selection, rival, visible)
+                selection.considered.append(ConsideredEffect(effect, gain, False, reason))
+                return confirmed(context, selection, rival, visible)
             continue
-        selection.considered.append(Candidate(effect, gain, False, reason))
-        plain = selection.plainer(fit, effect)
-        worth = plain is not None and selection.worthwhile(reduced, plain)
-        return confirmed(inquiry, selection, plain if plain is not None and worth else reduced, visible)
+        selection.considered.append(ConsideredEffect(effect, gain, False, reason))
+        plain = selection.with_reduced_law(fit, effect)
+        worth = plain is not None and selection.gains_enough(reduced, plain)
+        return confirmed(context, selection, plain if plain is not None and worth else reduced, visible)
     return fit
 
 
-def _uncertain(inquiry: Inquiry, selection: Selection, fit: Fit) -> list[str]:
+def _uncertain(context: Context, selection: Selection, fit: Fit) -> list[str]:
     """Effects none of whose sizes is known to differ from nothing.
 
     Beside chance, halving the simulator's step may move a size by as much as it is, and innovations that stay coloured
@@ -132,7 +132,7 @@ def _uncertain(inquiry: Inquiry, selection: Selection, fit: Fit) -> list[str]:
     """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
-    known = size > CERTAIN * deviations(inquiry.fitter, fit, selection.nominal)
+    known = size > CERTAIN * deviations(context.fitter, fit, selection.nominal)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
@@ -143,133 +143,133 @@ def _uncertain(inquiry: Inquiry, selection: Selection, fit: Fit) -> list[str]:
 
 
 def _rival_that_transfers(
-    inquiry: Inquiry, selection: Selection, fit: Fit, effect: str, repeated: Transfer, gain: float
+    context: Context, selection: Selection, fit: Fit, effect: str, repeated: Transfer, gain: float
 ) -> Fit | None:
     """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
-    if inquiry.heldout_gain(repeated, selection.without(fit, effect)) >= -TOLERATED:
+    if context.heldout_gain(repeated, selection.without(fit, effect)) >= -TOLERATED:
         return None
-    error = inquiry.heldout_error(repeated)
+    error = context.heldout_error(repeated)
     for other in selection.replacements(fit, effect)[:RIVALS]:
         if set(other.effects) != set(fit.effects) and selection.evidence(other, fit) < GIVEN_UP * gain:
-            again = inquiry.fitter.polished(inquiry.fitter.fit(other.hypothesis, fit.levels))
-            if inquiry.heldout_error(transfer(inquiry.fitter, again)) < (1.0 - VISIBLE) * error:
+            again = context.fitter.polished(context.fitter.fit(other.hypothesis, fit.levels))
+            if context.heldout_error(transfer(context.fitter, again)) < (1.0 - VISIBLE) * error:
                 return again
     return None
 
 
-def remaining(inquiry: Inquiry, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
+def remaining(context: Context, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
     explained = fit.motion_likelihood - selection.nominal.motion_likelihood
-    least = _least_gains(inquiry, fit, explained)
-    other = _other_law(inquiry, selection, fit, least["force"])
+    least = _least_gains(context, fit, explained)
+    other = _other_law(context, selection, fit, least["force"])
     if other is not None:
         return other
-    left, p_value = significant_leftovers(inquiry, fit, explained, shapes)
-    if not left and not _is_far_off(inquiry, fit):
+    left, p_value = significant_residuals(context, fit, explained, shapes)
+    if not left and not _is_far_off(context, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
-    strongest = max(left, key=lambda leftover: leftover.gain) if left else None
+    strongest = max(left, key=lambda residual: residual.gain) if left else None
     worth = least["force"] if strongest is None else least[strongest.shape.kind]
-    resembles, named = _beyond(inquiry, selection, fit, worth)
+    resembles, named = _beyond(context, selection, fit, worth)
     if strongest is None:
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
-    forces = [leftover for leftover in left if leftover.shape.kind != "resonance"]
+    forces = [residual for residual in left if residual.shape.kind != "resonance"]
     if not forces:
-        if named is None and inquiry.log.has_means:  # which feign what swings; its law does not confirm it
+        if named is None and context.data.has_means:  # which feign what swings; its law does not confirm it
             return Rest(fit, None, p_value, False, (), np.zeros(0))
-        named = fit if named is None else _without_superfluous(inquiry, selection, named)
+        named = fit if named is None else _without_superfluous(context, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
-    widest = max(forces, key=lambda leftover: leftover.gain)
-    stood_in, spread = with_curve(inquiry.by_row, inquiry.setting, fit, widest)
+    widest = max(forces, key=lambda residual: residual.gain)
+    stood_in, spread = with_curve(context.by_row, context.setting, fit, widest)
     if named is not None and named.log_likelihood > stood_in.log_likelihood:
-        named = _without_superfluous(inquiry, selection, named)
+        named = _without_superfluous(context, selection, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     for effect in fit.effects:
-        if selection.evidence(inquiry.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
-            return remaining(inquiry, selection, selection.without(fit, effect), shapes)
+        if selection.evidence(context.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
+            return remaining(context, selection, selection.without(fit, effect), shapes)
     return Rest(stood_in, widest, p_value, True, resembles, spread)
 
 
-def significant_leftovers(
-    inquiry: Inquiry, fit: Fit, explained: float, shapes: list[Shape]
-) -> tuple[list[Leftover], float]:
+def significant_residuals(
+    context: Context, fit: Fit, explained: float, shapes: list[Shape]
+) -> tuple[list[Residual], float]:
     """Leftovers of a fit by innovations that are no chance, and large enough; and the p value that there is none.
 
     Args:
-        inquiry: The means.
+        context: The means.
         fit: By innovations.
         explained: What it explains [nats].
         shapes: In which they are looked for.
     """
-    found = leftovers(inquiry.by_row, fit, shapes)
-    p_value = min(1.0, min(leftover.p_value for leftover in found) * len(shapes))
-    least = _least_gains(inquiry, fit, explained)
+    found = residual_tests(context.by_row, fit, shapes)
+    p_value = min(1.0, min(residual.p_value for residual in found) * len(shapes))
+    least = _least_gains(context, fit, explained)
     return _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT), p_value
 
 
-def _least_gains(inquiry: Inquiry, fit: Fit, explained: float) -> dict[str, float]:
-    """What a leftover of each kind must gain beside a fit that explains so much [nats]."""
-    share = (nonsmooth_search.SHARE if nonsmooth_search.is_rough(fit) else LEFTOVER_SHARE) * explained
-    factor = BESIDE_MEANS if inquiry.log.has_means else 1.0
-    curve, swing = factor * max(LEFTOVER_GAIN, share), factor * max(SWING_GAIN, share)
+def _least_gains(context: Context, fit: Fit, explained: float) -> dict[str, float]:
+    """What a residual of each kind must gain beside a fit that explains so much [nats]."""
+    share = (nonsmooth_search.SHARE if nonsmooth_search.is_non_smooth(fit) else RESIDUAL_SHARE) * explained
+    factor = BESIDE_MEANS if context.data.has_means else 1.0
+    curve, swing = factor * max(RESIDUAL_GAIN, share), factor * max(SWING_GAIN, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
 
 
-def _significant(found: list[Leftover], p_value: float, least: Mapping[str, float], level: float) -> list[Leftover]:
+def _significant(found: list[Residual], p_value: float, least: Mapping[str, float], level: float) -> list[Residual]:
     """Leftovers that are no chance, and large enough; none where the most significant one may be chance."""
     if p_value >= level:
         return []
     return [left for left in found if left.p_value < level and left.gain >= least[left.shape.kind]]
 
 
-def _beyond(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
+def _beyond(context: Context, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
     """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
-    ranked = prospects(inquiry.fitter, inquiry.setting, fit, beyond=True)
+    ranked = candidates_beside(context.fitter, context.setting, fit, outside_vocabulary=True)
     best: dict[str, Fit] = {}
-    for prospect in ranked:
-        if prospect.gain < 0.3 * ranked[0].gain or prospect.gain < 0.3 * worth or len(best) == 3:
+    for candidate in ranked:
+        if candidate.gain < 0.3 * ranked[0].gain or candidate.gain < 0.3 * worth or len(best) == 3:
             break
-        if prospect.effect not in best:
-            values = {**fit.hypothesis.values, **prospect.values}
-            hypothesis = Hypothesis.of(inquiry.setting, (*fit.effects, prospect.effect), values)
-            best[prospect.effect] = inquiry.fitter.polished(inquiry.fitter.fit(hypothesis, fit.levels), rounds=2)
+        if candidate.effect not in best:
+            values = {**fit.hypothesis.values, **candidate.values}
+            hypothesis = Hypothesis.of(context.setting, (*fit.effects, candidate.effect), values)
+            best[candidate.effect] = context.fitter.polished(context.fitter.fit(hypothesis, fit.levels), rounds=2)
     good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
     ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
     return tuple(ordered), good[ordered[0]] if ordered else None
 
 
-def _other_law(inquiry: Inquiry, selection: Selection, fit: Fit, worth: float) -> Rest | None:
+def _other_law(context: Context, selection: Selection, fit: Fit, worth: float) -> Rest | None:
     """What remains with a law from beyond the vocabulary in the place of a named one; None if that gains little."""
     best, most = None, worth
     for effect in fit.effects:
-        law = richer(fit, effect)
+        law = extended_effects(fit, effect)
         if law is not None:
             effects, starts = law
-            begins = [Hypothesis.of(inquiry.setting, effects, start) for start in starts]
-            start = inquiry.fitter.likeliest(begins, fit.levels, 1)[0]
-            found = inquiry.fitter.polished(inquiry.fitter.fit(start, fit.levels), rounds=2)
+            begins = [Hypothesis.of(context.setting, effects, start) for start in starts]
+            start = context.fitter.likeliest(begins, fit.levels, 1)[0]
+            found = context.fitter.polished(context.fitter.fit(start, fit.levels), rounds=2)
             gain = selection.evidence(fit, found)
             taken = gain > most
             reason = f"explains {'more' if taken else 'hardly more'} in the place of {effect}"
-            selection.considered.append(Candidate(effects[-1], gain, taken, reason))
+            selection.considered.append(ConsideredEffect(effects[-1], gain, taken, reason))
             if taken:
                 best, most = found, gain
     if best is None:
         return None
     p_value = float(chdtrc(len(best.hypothesis.cube) - len(fit.hypothesis.cube), 2.0 * most))
-    best = _without_superfluous(inquiry, selection, best)
+    best = _without_superfluous(context, selection, best)
     return Rest(best, None, p_value, True, (best.effects[-1],), np.zeros(0))
 
 
-def _is_far_off(inquiry: Inquiry, fit: Fit) -> bool:
+def _is_far_off(context: Context, fit: Fit) -> bool:
     """Whether predictions are much worse than sensor noise makes them."""
-    return inquiry.errors(fit).times_the_floor > FAR_OFF
+    return context.errors(fit).times_the_floor > FAR_OFF
 
 
-def _without_superfluous(inquiry: Inquiry, selection: Selection, fit: Fit) -> Fit:
+def _without_superfluous(context: Context, selection: Selection, fit: Fit) -> Fit:
     """Without effects that one from beyond the vocabulary has made superfluous."""
     for effect in fit.effects[:-1]:
         rest = tuple(e for e in fit.effects if e != effect)
         smaller = selection.fitted(rest, fit)
-        if not selection.worthwhile(smaller, fit):
-            return _without_superfluous(inquiry, selection, smaller)
+        if not selection.gains_enough(smaller, fit):
+            return _without_superfluous(context, selection, smaller)
     return fit

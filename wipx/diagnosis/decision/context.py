@@ -10,9 +10,9 @@ from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.selection.search import Selection
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
@@ -31,7 +31,7 @@ TOLERATED = 0.05  # by which squared errors of held-out predictions may grow wit
 
 
 @dataclass(frozen=True)
-class Inquiry:
+class Context:
     """The means of one diagnosis.
 
     Attributes:
@@ -51,17 +51,17 @@ class Inquiry:
     recordings: tuple[Recording, ...]
 
     @classmethod
-    def of(cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator) -> "Inquiry":
+    def of(cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator) -> "Context":
         """The means for recordings of a robot."""
         plant = setting.nominal.plant
-        log = Log.of(recordings, plant)
+        data = RecordingBatch.of(recordings, plant)
         noise = sensor_noise(recordings, plant)
-        rates = [_rate_noise(recordings, plant.rates[c - log.joints]) for c in log.channels if c >= log.joints]
-        levels = NoiseLevels(np.full(log.joints, 0.01), np.array([*noise, *rates]))
-        fitter = InnovationFitter(Follower.of(simulator, log, setting.nominal))
+        rates = [_rate_noise(recordings, plant.rates[c - data.joints]) for c in data.channels if c >= data.joints]
+        levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
+        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal))
         return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
 
-    def trusting(self, fit: Fit) -> "Inquiry":
+    def trusting(self, fit: Fit) -> "Context":
         """The same; all models predict from states of the filter from which that of a fit predicts best."""
         tuned = self.judge.tuned(fit.hypothesis.model, self.recordings)
         return replace(self, judge=replace(self.judge, bandwidths=tuned.bandwidths))
@@ -79,7 +79,7 @@ class Inquiry:
         errors = self.errors(fit)
         if errors.times_the_floor <= FAR_FROM_THE_FLOOR:
             return True
-        trusting = dict.fromkeys(self.log.plant.coordinates, RIGHT)
+        trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
         return all(others[name] <= DISTRUSTED * error for name, error in errors.completed.items())
@@ -87,7 +87,7 @@ class Inquiry:
     def is_quiet(self, fit: Fit) -> bool:
         """Whether a fit asks for no forces but those of its laws, row by row."""
         levels = self.fitter.seen_by_row(fit)[1].levels
-        usual = np.array([self.setting.scales[site].force for site in self.log.plant.joints])
+        usual = np.array([self.setting.scales[site].force for site in self.data.plant.joints])
         return bool(np.all(levels.force <= QUIET * usual))
 
     def errors(self, fit: Fit) -> FitErrors:
@@ -95,14 +95,14 @@ class Inquiry:
         return self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
 
     @property
-    def log(self) -> Log:
+    def data(self) -> RecordingBatch:
         """The recordings."""
-        return self.fitter.log
+        return self.fitter.data
 
     @property
     def is_driven(self) -> bool:
         """Whether any command ever changes."""
-        return bool(np.ptp(self.log.inputs.commands, axis=0).max() > 0.0)
+        return bool(np.ptp(self.data.inputs.commands, axis=0).max() > 0.0)
 
     def transfers(self, smaller: Fit, larger: Fit) -> bool:
         """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
@@ -140,7 +140,7 @@ class Inquiry:
         return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
 
     def _squared_error(self, predicted: list[np.ndarray]) -> float:
-        columns = self.log.plant.coordinates
+        columns = self.data.plant.coordinates
         return sum(
             float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
             for recording, coordinates in zip(self.recordings, predicted, strict=True)

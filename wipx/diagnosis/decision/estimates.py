@@ -8,7 +8,7 @@ from wipx.core.diagnosis import Bound
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.results import Estimate
-from wipx.diagnosis.candidates.screening import Prospect
+from wipx.diagnosis.candidates.screening import Candidate
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.nonsmooth_search import alike
 from wipx.diagnosis.likelihood.sandwich import covariance
@@ -76,20 +76,20 @@ def _explained(fit: Fit, nominal: Fit) -> float:
     return max(fit.log_likelihood - nominal.log_likelihood, 0.0)
 
 
-def bounds(looked_at: list[Prospect], plant: Plant) -> tuple[Bound, ...]:
+def bounds(looked_at: list[Candidate], plant: Plant) -> tuple[Bound, ...]:
     """How large effects that were not found could be: from the sharpest look at each."""
     sharpest: dict[str, tuple[float, Bound]] = {}
-    for prospect in looked_at:
-        first, value = next(iter(prospect.values)), prospect.estimate
-        if not np.isfinite(prospect.deviation):
+    for candidate in looked_at:
+        first, value = next(iter(candidate.values)), candidate.estimate
+        if not np.isfinite(candidate.deviation):
             continue
-        spec = effect_of(prospect.effect, plant).parameters[0]
-        unit = spec.unit(angular=plant.is_angular(prospect.effect.partition("/")[0]))
-        reach = NINETY_FIVE * prospect.deviation
+        spec = effect_of(candidate.effect, plant).parameters[0]
+        unit = spec.unit(angular=plant.is_angular(candidate.effect.partition("/")[0]))
+        reach = NINETY_FIVE * candidate.deviation
         low = max(value - reach, spec.neutral) if spec.low >= spec.neutral else value - reach
-        known = sharpest.get(prospect.effect)
-        if known is None or prospect.deviation < known[0]:
-            sharpest[prospect.effect] = (prospect.deviation, Bound(first, low, max(value + reach, low), unit))
+        known = sharpest.get(candidate.effect)
+        if known is None or candidate.deviation < known[0]:
+            sharpest[candidate.effect] = (candidate.deviation, Bound(first, low, max(value + reach, low), unit))
     return tuple(bound for _, bound in sharpest.values())
 
 

@@ -3,7 +3,7 @@
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
 So innovations come first. The search is repeated by forecasts where the laws of the first one, with what stands in for
-what they leave over, hold only nearly (`Inquiry.is_trusted`). If recordings are far likelier with that stand-in, half a
+what they leave over, hold only nearly (`Context.is_trusted`). If recordings are far likelier with that stand-in, half a
 second ahead, than with all that forecasts find, the first answer counts.
 """
 
@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.diagnosis.decision.confirmation import Rest, decided, significant_leftovers
-from wipx.diagnosis.decision.context import Inquiry
+from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import ALIKE, LEAST_GAIN, Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.residuals.residual_tests import Leftover, Shape, shapes_of
+from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.search import Selection
 
 
@@ -25,46 +25,46 @@ class Found:
     """What a search ends with.
 
     Attributes:
-        inquiry: The means, with the evidence that decided.
+        context: The means, with the evidence that decided.
         selection: The search.
         rest: The final fit, and what it leaves over.
         shapes: In which that was looked for.
     """
 
-    inquiry: Inquiry
+    context: Context
     selection: Selection
     rest: Rest
     shapes: list[Shape]
 
 
-def found(inquiry: Inquiry, selection: Selection, chosen: Fit) -> Found:
+def found(context: Context, selection: Selection, chosen: Fit) -> Found:
     """What is missing, by the evidence that suits the recordings.
 
     Args:
-        inquiry: The means, with innovations as evidence.
+        context: The means, with innovations as evidence.
         selection: The search by innovations.
         chosen: What it chose.
     """
-    inquiry = inquiry.trusting(chosen)
-    fitter = ForecastFitter(inquiry.by_row, inquiry.first_levels, chosen.levels, inquiry.setting.doubted())
-    rest, shapes = decided(inquiry, selection, chosen)
-    by_row = Found(inquiry, selection, rest, shapes)
-    if not fitter.is_possible or (not rest.significant and inquiry.is_trusted(rest.fit)):
+    context = context.trusting(chosen)
+    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.levels, context.setting.doubted())
+    rest, shapes = decided(context, selection, chosen)
+    by_row = Found(context, selection, rest, shapes)
+    if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
         return by_row
-    ahead, agrees = _by_forecasts(inquiry, fitter, chosen)
+    ahead, agrees = _by_forecasts(context, fitter, chosen)
     if rest.significant:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row
-        if ahead.rest.significant or ahead.inquiry.is_quiet(ahead.rest.fit):
+        if ahead.rest.significant or ahead.context.is_quiet(ahead.rest.fit):
             return ahead
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
-    exact = bool(rest.fit.effects) and inquiry.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
+    exact = bool(rest.fit.effects) and context.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
     return by_row if agrees or exact else ahead
 
 
 def _predicts_better(one: Found, other: Found) -> bool:
     """Whether an answer predicts the recordings better than another one."""
-    errors, others = (each.inquiry.errors(each.rest.fit).completed for each in (one, other))
+    errors, others = (each.context.errors(each.rest.fit).completed for each in (one, other))
     return float(np.mean([(errors[name] / max(others[name], 1e-300)) ** 2 for name in errors])) < 1.0
 
 
@@ -76,19 +76,19 @@ def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
     return fitter.separation(seen, other, lead, 1.0) > ALIKE
 
 
-def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
+def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
     """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
 
     A second search starts from what innovations chose; the better end counts.
     """
-    setting = inquiry.setting
-    ahead = replace(inquiry, fitter=fitter)
+    setting = context.setting
+    ahead = replace(context, fitter=fitter)
     nominal = fitter.begun(Hypothesis.of(setting, (), {}))
     selection = Selection(fitter, setting, nominal)
     best = selection.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
     same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
-    if not selection.worthwhile(nominal, same):
+    if not selection.gains_enough(nominal, same):
         same = nominal
     if set(same.effects) != set(best.effects) and selection.lead(same, best) > 0.0:
         best = selection.exchanged(same)
@@ -98,16 +98,16 @@ def _by_forecasts(inquiry: Inquiry, fitter: ForecastFitter, chosen: Fit) -> tupl
     return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
 
 
-def _left_by_row(inquiry: Inquiry, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Leftover], float]:
+def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:
     """What is left over by innovations; mean commands feign what swings, which does not count there."""
-    left, p_value = significant_leftovers(inquiry, fit, fit.motion_likelihood - nominal.motion_likelihood, shapes)
-    return [one for one in left if one.shape.kind != "resonance" or not inquiry.log.has_means], p_value
+    left, p_value = significant_residuals(context, fit, fit.motion_likelihood - nominal.motion_likelihood, shapes)
+    return [one for one in left if one.shape.kind != "resonance" or not context.data.has_means], p_value
 
 
-def _left_over(inquiry: Inquiry, selection: Selection, fit: Fit) -> tuple[Rest, list[Shape]]:
+def _left_over(context: Context, selection: Selection, fit: Fit) -> tuple[Rest, list[Shape]]:
     """What forecasts leave over, as innovations show it."""
-    by_row, seen = inquiry.fitter.seen_by_row(fit)
+    by_row, seen = context.fitter.seen_by_row(fit)
     shapes = shapes_of(by_row, seen)
-    left, p_value = _left_by_row(inquiry, seen, inquiry.fitter.seen_by_row(selection.nominal)[1], shapes)
-    strongest = max(left, key=lambda leftover: leftover.gain) if left else None
+    left, p_value = _left_by_row(context, seen, context.fitter.seen_by_row(selection.nominal)[1], shapes)
+    strongest = max(left, key=lambda residual: residual.gain) if left else None
     return Rest(fit, strongest, p_value, bool(left), (), np.zeros(0)), shapes

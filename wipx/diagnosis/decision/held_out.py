@@ -28,7 +28,7 @@ class Transfer:
 
 def transfer(fitter: Fitter, fit: Fit) -> Transfer:
     """Leave out each recording; one alone is judged by the model that was fitted to it."""
-    count = len(fitter.log.recordings)
+    count = len(fitter.data.recordings)
     cubes = [fit.hypothesis.cube] * count
     if count > 1 and len(fit.hypothesis.cube):
         cubes = [fitter.without(r).fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube for r in range(count)]

@@ -1,8 +1,8 @@
 """Is robot.yaml, or the reading of the log, grossly wrong: signs, units, zeros.
 
-Such a slip looks like missing physics of every kind at once. Each of the usual ones is undone in turn, and where the
+Such a mistake looks like missing physics of every kind at once. Each of the usual ones is undone in turn, and where the
 nominal model then explains the recordings far better than any single effect makes it, the owner is told instead of
-being given a diagnosis. What is uncertain by a few per cent is no slip; that is what effects are for.
+being given a diagnosis. What is uncertain by a few per cent is no mistake; that is what effects are for.
 """
 
 from collections.abc import Mapping
@@ -17,10 +17,10 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.selection.search import Selection
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
@@ -40,7 +40,7 @@ ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross dif
 
 
 @dataclass(frozen=True)
-class Slip:
+class Mistake:
     """A mistake of owners, by what undoes it.
 
     Attributes:
@@ -66,20 +66,20 @@ class Slip:
         changed = {n: f * recording[n] + offset for n, (f, offset) in self.columns.items() if n in recording}
         return Recording(recording.name, {**recording.columns, **changed}, recording.source, recording.periods)
 
-    def factors(self, log: Log) -> np.ndarray:
+    def factors(self, data: RecordingBatch) -> np.ndarray:
         """Size of the factor on each recorded channel, shape (m,)."""
-        names = (*log.plant.coordinates, *log.plant.rates)
-        return np.array([abs(self.columns.get(names[c], (1.0, 0.0))[0]) for c in log.channels])
+        names = (*data.plant.coordinates, *data.plant.rates)
+        return np.array([abs(self.columns.get(names[c], (1.0, 0.0))[0]) for c in data.channels])
 
-    def is_of_commands(self, log: Log) -> bool:
+    def is_of_commands(self, data: RecordingBatch) -> bool:
         """Whether it leaves motion and model as they are."""
-        return not self.parameters and set(self.columns) <= set(log.plant.commands)
+        return not self.parameters and set(self.columns) <= set(data.plant.commands)
 
-    def leaves_motion(self, log: Log) -> bool:
-        """Whether the coordinates still move noticeably once it is put right; a unit that is right is no slip."""
+    def leaves_motion(self, data: RecordingBatch) -> bool:
+        """Whether the coordinates still move noticeably once it is put right; a unit that is right is no mistake."""
         for column, (factor, _) in self.columns.items():
-            if column in log.plant.coordinates:
-                travel = max(float(np.ptp(r[column])) for r in log.recordings)
+            if column in data.plant.coordinates:
+                travel = max(float(np.ptp(r[column])) for r in data.recordings)
                 if abs(factor) * travel < LEAST_MOTION:
                     return False
         return True
@@ -88,7 +88,8 @@ class Slip:
 def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, best: Fit, where: str) -> None:
     """Refuse a robot.yaml that the recordings contradict grossly.
 
-    The likeliest slip must explain more than the nominal model does, and far more when both may have one effect beside.
+    The likeliest mistake must explain more than the nominal model does, and far more when both may have one effect
+    beside.
     With commands put right the nominal model must predict half a second better, too: a late drive looks reversed from
     row to row.
 
@@ -102,47 +103,49 @@ def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, be
     Raises:
         InputError: a sign, a unit or a zero is wrong; the message says which and how to mend it.
     """
-    log = fitter.log
-    probe = _Case.of(fitter.simulator, _probed(log.recordings), setting, nominal.levels)
-    possible = [slip for slip in slips(setting.nominal) if slip.leaves_motion(log)]
-    mended = [(probe.without(slip), slip) for slip in possible]
-    case, slip = max(mended, key=lambda pair: pair[0].nominal_likelihood)
+    data = fitter.data
+    probe = _Case.of(fitter.simulator, _probed(data.recordings), setting, nominal.levels)
+    possible = [mistake for mistake in mistakes(setting.nominal) if mistake.leaves_motion(data)]
+    mended = [(probe.without(mistake), mistake) for mistake in possible]
+    case, mistake = max(mended, key=lambda pair: pair[0].nominal_likelihood)
     if case.nominal_likelihood <= probe.nominal_likelihood:
         return
     believed = max(probe.nominal_likelihood, probe.likelihood_with(best))
     gain = (case.best_likelihood() - believed) / probe.values
-    predicts = not slip.is_of_commands(log) or case.relative_error < probe.relative_error
+    predicts = not mistake.is_of_commands(data) or case.relative_error < probe.relative_error
     if gain > OVERWHELMING and predicts:
         raise InputError(
-            f"{where}: the recordings contradict its {slip.contradicted} (with {slip.undone} the model's errors from "
-            f"row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {slip.remedy}"
+            f"{where}: the recordings contradict its {mistake.contradicted} (with {mistake.undone} the model's errors "
+            f"from row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {mistake.remedy}"
         )
 
 
-def slips(nominal: Model) -> tuple[Slip, ...]:
+def mistakes(nominal: Model) -> tuple[Mistake, ...]:
     """The mistakes that are possible for a robot."""
     plant = nominal.plant
     found = [*_signs(plant), *_units_of_columns(nominal), *_zeros(plant), *_units_of_parameters(nominal)]
     return tuple(found)
 
 
-def _signs(plant: Plant) -> list[Slip]:
+def _signs(plant: Plant) -> list[Mistake]:
     named = " and ".join(plant.commands)
     mapped = ", ".join(f"{u}: {{column: {u}, scale: -1}}" for u in plant.commands)
     reverse = {u: (-1.0, 0.0) for u in plant.commands}
-    reversed_commands = Slip(f"sign of {named}", f"{named} reversed", f"reverse it with signals: {{{mapped}}}", reverse)
+    reversed_commands = Mistake(
+        f"sign of {named}", f"{named} reversed", f"reverse it with signals: {{{mapped}}}", reverse
+    )
     if len(plant.joints) == 1 or plant.kind == "double_pendulum":
         return [reversed_commands]  # a reversed coordinate is the same
     return [reversed_commands, *(_reversed(column) for column in plant.coordinates)]
 
 
-def _reversed(column: str) -> Slip:
+def _reversed(column: str) -> Mistake:
     remedy = f"reverse it with signals: {{{column}: {{column: {column}, scale: -1}}}}, and its rate likewise"
     columns = {column: (-1.0, 0.0), f"{column}_dot": (-1.0, 0.0)}
-    return Slip(f"sign of {column}", f"{column} reversed", remedy, columns)
+    return Mistake(f"sign of {column}", f"{column} reversed", remedy, columns)
 
 
-def _units_of_columns(nominal: Model) -> list[Slip]:
+def _units_of_columns(nominal: Model) -> list[Mistake]:
     plant = nominal.plant
     found = []
     angles = [column for column in plant.coordinates if column != "x"]
@@ -150,28 +153,28 @@ def _units_of_columns(nominal: Model) -> list[Slip]:
         columns = {name: (np.pi / 180.0, 0.0) for a in angles for name in (a, f"{a}_dot")}
         mapped = ", ".join(f"{a}: {{column: {a}, unit: deg}}" for a in angles)
         found.append(
-            Slip(f"unit of {' and '.join(angles)}, rad", "degrees read", f"write signals: {{{mapped}}}", columns)
+            Mistake(f"unit of {' and '.join(angles)}, rad", "degrees read", f"write signals: {{{mapped}}}", columns)
         )
     if "x" in plant.coordinates:
         columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
-        found.append(Slip("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
+        found.append(Mistake("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
     radius = nominal.parameters.get("wheel_radius", 1.0)
     if "x" in plant.coordinates and abs(np.log(radius)) > ALIKE:
         remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
-        found.append(Slip("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
+        found.append(Mistake("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
     return found
 
 
-def _zeros(plant: Plant) -> list[Slip]:
+def _zeros(plant: Plant) -> list[Mistake]:
     column = next((column for column in plant.coordinates if column != "x"), None)
     if column is None:
         return []
     zero, other = ("hanging", "upright") if plant.kind == "double_pendulum" else ("upright", "hanging")
     remedy = f"move it with signals: {{{column}: {{column: {column}, offset: 3.14159}}}}"
-    return [Slip(f"zero of {column}, which is {zero}", f"0 taken for {other}", remedy, {column: (1.0, np.pi)})]
+    return [Mistake(f"zero of {column}, which is {zero}", f"0 taken for {other}", remedy, {column: (1.0, np.pi)})]
 
 
-def _units_of_parameters(nominal: Model) -> list[Slip]:
+def _units_of_parameters(nominal: Model) -> list[Mistake]:
     wrong = (
         ("body_mass", 1e-3, "g", "kg"),
         ("body_inertia", 1e-3, "g m^2", "kg m^2"),
@@ -185,14 +188,14 @@ def _units_of_parameters(nominal: Model) -> list[Slip]:
             continue
         value = factor * nominal.parameters[name]
         remedy = f"write {name}: {value:.5g} if it is in {taken}"
-        slip = Slip(f"{name}, {expected}", f"{taken} read", remedy, parameters={name: factor})
-        if _is_a_body(slip.model(nominal)):
-            found.append(slip)
+        mistake = Mistake(f"{name}, {expected}", f"{taken} read", remedy, parameters={name: factor})
+        if _is_a_body(mistake.model(nominal)):
+            found.append(mistake)
     return found
 
 
 def _is_a_body(model: Model) -> bool:
-    """Whether inertia, mass and height could belong to one body; a slip leaves them decades apart."""
+    """Whether inertia, mass and height could belong to one body; a mistake leaves them decades apart."""
     p = model.parameters
     if "body_inertia" not in p:
         return False
@@ -205,7 +208,7 @@ def _probed(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
 
 @dataclass(frozen=True)
 class _Case:
-    """Recordings beside a description of the robot, as given or with a slip put right.
+    """Recordings beside a description of the robot, as given or with a mistake put right.
 
     Attributes:
         fitter: Of these recordings.
@@ -230,15 +233,15 @@ class _Case:
         levels: NoiseLevels,
         density: float = 0.0,
     ) -> "_Case":
-        log = Log.of(recordings, setting.nominal.plant)
-        fitter = InnovationFitter(Follower.of(simulator, log, setting.nominal))
+        data = RecordingBatch.of(recordings, setting.nominal.plant)
+        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal))
         return cls(fitter, setting, _polished(fitter, Hypothesis.of(setting, (), {}), levels), levels, density)
 
     @property
     def values(self) -> int:
         """How many recorded values count."""
-        log = self.fitter.log
-        return int(log.counted.sum()) * log.signals
+        data = self.fitter.data
+        return int(data.counted.sum()) * data.signals
 
     @property
     def nominal_likelihood(self) -> float:
@@ -248,7 +251,7 @@ class _Case:
     @property
     def relative_error(self) -> float:
         """Root mean square error of the nominal model's predictions, over the spread of each coordinate."""
-        recordings, model = self.fitter.log.recordings, self.setting.nominal
+        recordings, model = self.fitter.data.recordings, self.setting.nominal
         judge = Judge(self.fitter.simulator, sensor_noise(recordings, model.plant), HORIZON)
         errors = judge.compare(model, model, recordings, held_out=False)[0].completed
         spread = {name: max(float(np.ptp(r[name])) for r in recordings) for name in errors}
@@ -268,16 +271,16 @@ class _Case:
             extended = []
         return max(self._likelihood(fit) for fit in (self.nominal, *extended))
 
-    def without(self, slip: Slip) -> "_Case":
-        """The same recordings with a slip put right."""
-        log = self.fitter.log
-        recordings = tuple(slip.recording(r) for r in log.recordings)
-        model = slip.model(self.setting.nominal)
+    def without(self, mistake: Mistake) -> "_Case":
+        """The same recordings with a mistake put right."""
+        data = self.fitter.data
+        recordings = tuple(mistake.recording(r) for r in data.recordings)
+        model = mistake.model(self.setting.nominal)
         scales = scales_of(model, recordings)
-        factors = slip.factors(log)
-        force = np.array([QUIET_FORCE * scales[site].force for site in log.plant.joints])
+        factors = mistake.factors(data)
+        force = np.array([QUIET_FORCE * scales[site].force for site in data.plant.joints])
         levels = NoiseLevels(force, self.levels.sensor * factors)
-        density = int(log.counted.sum()) * float(np.log(factors).sum())
+        density = int(data.counted.sum()) * float(np.log(factors).sum())
         mended = Setting(model, self.setting.uncertainty, scales)
         return _Case.of(self.fitter.simulator, recordings, mended, levels, density)
 
@@ -295,9 +298,9 @@ def _polished(fitter: InnovationFitter, hypothesis: Hypothesis, levels: NoiseLev
 
 
 def _runs_away(fitter: InnovationFitter, fit: Fit) -> bool:
-    """Whether innovations are at the bound of what is counted; the colour takes a constant for no error at all."""
-    follower, levels = fitter.follower, fit.levels
+    """Whether innovations are at the bound of what is counted; the noise model takes a constant for no error at all."""
+    innovations_model, levels = fitter.innovations_model, fit.levels
     batch = fit.hypothesis.space.batch(fit.hypothesis.cube)
-    gains = follower.gains(levels, fit.hypothesis.model)
-    innovations = follower.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
+    gains = innovations_model.gains(levels, fit.hypothesis.model)
+    innovations = innovations_model.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
     return float(np.mean(np.abs(innovations) >= LARGEST)) > RUN_AWAY

@@ -16,7 +16,7 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.sim.analytic import AnalyticSimulator
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class Fitter(ABC):
 
     @property
     @abstractmethod
-    def log(self) -> Log:
+    def data(self) -> RecordingBatch:
         """The recordings."""
 
     @property

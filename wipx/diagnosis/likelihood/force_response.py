@@ -22,15 +22,15 @@ def motion_of(fitter: InnovationFitter, fit: Fit) -> dict[str, np.ndarray]:
     Coordinates and rates are those that the fit's observer expects: a force made of them knows nothing of the
     noise of the row that it is tested on.
     """
-    log = fitter.log
-    plant = log.plant
-    gains = fitter.follower.gains(fit.levels, fit.hypothesis.model)
-    state = fitter.follower.estimated(fit.hypothesis.model, gains, fit.levels.spread)
+    data = fitter.data
+    plant = data.plant
+    gains = fitter.innovations_model.gains(fit.levels, fit.hypothesis.model)
+    state = fitter.innovations_model.estimated(fit.hypothesis.model, gains, fit.levels.spread)
     signals = {name: state[:, i] for i, name in enumerate((*plant.coordinates, *plant.rates))}
     for c, name in enumerate(plant.commands):
-        commands = log.inputs.commands[:, c]
+        commands = data.inputs.commands[:, c]
         signals[name] = np.concatenate([commands, commands[-1:]])
-    signals["t"] = np.where(log.rows, log.inputs.t, 0.0)
+    signals["t"] = np.where(data.rows, data.inputs.t, 0.0)
     return signals
 
 
@@ -45,29 +45,29 @@ def response(fitter: InnovationFitter, fit: Fit, joint: int, forces: np.ndarray)
 
     Args:
         fitter: Of the fit.
-        fit: Whose observer and colour count.
+        fit: Whose observer and noise model count.
         joint: Index of the joint.
         forces: At every row, of size one, shape (C, K + 1, R) [N or N m].
 
     Returns:
         Shape (R m (K + 1), C).
     """
-    follower = fitter.follower
-    linear, log = follower.linear, follower.log
-    gains = follower.gains(fit.levels, fit.hypothesis.model)
+    innovations_model = fitter.innovations_model
+    linear, data = innovations_model.linear, innovations_model.data
+    gains = innovations_model.gains(fit.levels, fit.hypothesis.model)
     innovations = np.zeros((len(forces), *fit.white.shape))
-    innovations[:, :, : len(log.channels)] = _driven(
+    innovations[:, :, : len(data.channels)] = _driven(
         linear.a,
         linear.b[:, :, joint].copy(),
         linear.place,
-        log.intervals,
-        log.inputs.last,
-        log.channels,
+        data.intervals,
+        data.inputs.last,
+        data.channels,
         gains.gains,
         gains.whitening,
         np.ascontiguousarray(forces.T),
     ).T
-    return whitened_change(innovations, fit.noise, log).reshape(len(forces), -1).T
+    return whitened_change(innovations, fit.noise, data).reshape(len(forces), -1).T
 
 
 @cached

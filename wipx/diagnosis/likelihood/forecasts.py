@@ -26,7 +26,7 @@ from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.effects.catalogue import vocabulary
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
@@ -116,13 +116,13 @@ class ForecastFitter(Fitter):
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
         if effect.kind == "rotor_inertia":
-            return self.log.joints > 1 and not name.startswith("pitch/")
-        return not effect.beyond or effect.kind in MACHINE
+            return self.data.joints > 1 and not name.startswith("pitch/")
+        return not effect.outside_vocabulary or effect.kind in MACHINE
 
     @property
-    def log(self) -> Log:
+    def data(self) -> RecordingBatch:
         """The recordings."""
-        return self.by_row.log
+        return self.by_row.data
 
     @cached_property
     def simulator(self) -> AnalyticSimulator:
@@ -133,7 +133,7 @@ class ForecastFitter(Fitter):
     @property
     def noise(self) -> np.ndarray:
         """Sensor noise of each coordinate, shape (joints,) [m or rad]."""
-        return self.first_levels.sensor[: self.log.joints]
+        return self.first_levels.sensor[: self.data.joints]
 
     @property
     def rows(self) -> int:
@@ -144,7 +144,7 @@ class ForecastFitter(Fitter):
     def blocks(self) -> np.ndarray:
         """Number of the stretch of time of every error, shape (N, H joints)."""
         number = np.floor(self.windows.starts / BLOCK).astype(np.int64) + 1_000_000 * self.windows.recording
-        return np.repeat(number[:, None], self._sampled.shape[0] * self.log.joints, axis=1)
+        return np.repeat(number[:, None], self._sampled.shape[0] * self.data.joints, axis=1)
 
     @property
     def runs(self) -> np.ndarray:
@@ -153,12 +153,12 @@ class ForecastFitter(Fitter):
 
     @cached_property
     def _recordings(self) -> tuple[Recording, ...]:
-        return tuple(condensed(recording, self.log.plant.commands) for recording in self.log.recordings)
+        return tuple(condensed(recording, self.data.plant.commands) for recording in self.data.recordings)
 
     @cached_property
     def windows(self) -> Windows:
         """The predictions."""
-        return cut(self._recordings, self.log.plant, horizon=HORIZON, lead=LEAD, stride=STRIDE)
+        return cut(self._recordings, self.data.plant, horizon=HORIZON, lead=LEAD, stride=STRIDE)
 
     @cached_property
     def _sampled(self) -> np.ndarray:
@@ -177,7 +177,7 @@ class ForecastFitter(Fitter):
         last = windows.inputs.t[windows.inputs.last, np.arange(windows.count)]
         interval = max(float(np.median(np.diff(recording.t))) for recording in self._recordings)
         whole = last >= windows.starts + HORIZON - 1.5 * interval - 1e-6
-        return whole & (windows.recording != (-1 if self.log.left_out is None else self.log.left_out))
+        return whole & (windows.recording != (-1 if self.data.left_out is None else self.data.left_out))
 
     @property
     def is_possible(self) -> bool:
@@ -208,7 +208,7 @@ class ForecastFitter(Fitter):
         """
         kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
         count = len(kept)
-        looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.log.plant).items())
+        looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.data.plant).items())
         reach = -float(stdtrit(count - 1, LEVEL / looked_at))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
         return float(kept.sum()) >= max(LEAST_GAIN, chance, MATTERS * self.rows)
@@ -299,7 +299,7 @@ class ForecastFitter(Fitter):
 
     def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
         """Starts by the model, of the filter from which its predictions are likeliest."""
-        tried = list(bandwidths) if bandwidths is not None else [np.full(self.log.joints, b) for b in BANDWIDTHS]
+        tried = list(bandwidths) if bandwidths is not None else [np.full(self.data.joints, b) for b in BANDWIDTHS]
         filters = [self._smoother.filtered(model, bandwidth, leads_of(self.windows)) for bandwidth in tried]
         if len(tried) == 1:
             return Anchors(tried[0], filters[0])
@@ -309,7 +309,7 @@ class ForecastFitter(Fitter):
 
     @cached_property
     def _smoother(self) -> Smoother:
-        return Smoother(self.simulator, self.log.plant, self._recordings, self.noise)
+        return Smoother(self.simulator, self.data.plant, self._recordings, self.noise)
 
     def polished(self, fit: Fit, *, rounds: int = 2) -> Fit:
         """Starts and values in turn until neither gains more."""
@@ -332,7 +332,7 @@ class ForecastFitter(Fitter):
 
     def _errors_from(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
         windows, sampled = self.windows, self._sampled
-        joints, count = self.log.joints, windows.count
+        joints, count = self.data.joints, windows.count
         found = np.empty((batch.size, count, len(sampled) * joints))
         size = max(1, LARGEST_CALL // (len(windows.inputs.t) * 4 * count))
         recorded = windows.recorded[sampled, :, np.arange(count)]  # (H, N, joints)
@@ -383,7 +383,7 @@ class ForecastFitter(Fitter):
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
         """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""
         values = self._likelihoods(replace(fit, white=white))
-        return np.bincount(self.windows.recording, values, minlength=len(self.log.recordings))
+        return np.bincount(self.windows.recording, values, minlength=len(self.data.recordings))
 
 
 def condensed(recording: Recording, commands: tuple[str, ...]) -> Recording:

@@ -1,6 +1,6 @@
 """Evidence of one row ahead: the likelihood of innovations, with the noise that suits a hypothesis best.
 
-Levenberg-Marquardt steps with observer and colour held fixed, in turn with a search over the noise levels.
+Levenberg-Marquardt steps with observer and noise model held fixed, in turn with a search over the noise levels.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.innovations_model import Follower
-from wipx.diagnosis.likelihood.noise_model import Colour, colour_of, whitened
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
+from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, whitened
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import stretches
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -33,7 +33,7 @@ LOUDER = 30.0  # times the noise of the forces, from which a fit is searched onc
 
 @dataclass(frozen=True)
 class InnovationFitter(Fitter):
-    """Fits hypotheses to the innovations of a follower."""
+    """Fits hypotheses to innovations."""
 
     considered = 6
     promising = 0.05
@@ -43,31 +43,31 @@ class InnovationFitter(Fitter):
     close_call = 60.0
     richer_by = 4.0
 
-    follower: Follower
+    innovations_model: InnovationsModel
 
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3."""
-        return not effect.beyond
+        return not effect.outside_vocabulary
 
     @property
-    def log(self) -> Log:
+    def data(self) -> RecordingBatch:
         """The recordings."""
-        return self.follower.log
+        return self.innovations_model.data
 
     @property
     def simulator(self) -> AnalyticSimulator:
         """The engine."""
-        return self.follower.simulator
+        return self.innovations_model.simulator
 
     @property
     def rows(self) -> int:
         """Rows that count."""
-        return int(self.log.counted.sum())
+        return int(self.data.counted.sum())
 
     @cached_property
     def blocks(self) -> np.ndarray:
         """Number of the stretch of time of every innovation, shape (R, m, K + 1)."""
-        return np.repeat(stretches(self.log)[:, None], self.log.signals, axis=1)
+        return np.repeat(stretches(self.data)[:, None], self.data.signals, axis=1)
 
     @property
     def runs(self) -> np.ndarray:
@@ -77,12 +77,12 @@ class InnovationFitter(Fitter):
     def refined(self) -> "InnovationFitter":
         """The same with half the step of the simulator."""
         return InnovationFitter(
-            replace(self.follower, simulator=replace(self.simulator, step=0.5 * self.simulator.step))
+            replace(self.innovations_model, simulator=replace(self.simulator, step=0.5 * self.simulator.step))
         )
 
     def without(self, recording: int) -> "InnovationFitter":
         """The same with a recording that does not count."""
-        return InnovationFitter(replace(self.follower, log=replace(self.log, left_out=recording)))
+        return InnovationFitter(replace(self.innovations_model, data=replace(self.data, left_out=recording)))
 
     def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""
@@ -116,27 +116,27 @@ class InnovationFitter(Fitter):
 
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
         """Log-likelihood of each recording, shape (R,), for white innovations (R, m, K + 1)."""
-        diagonal = np.einsum("krcc->rkc", self.follower.gains(fit.levels, fit.hypothesis.model).whitening)
-        counted = self.log.counted.T
+        diagonal = np.einsum("krcc->rkc", self.innovations_model.gains(fit.levels, fit.hypothesis.model).whitening)
+        counted = self.data.counted.T
         scale = np.where(counted, np.log(np.where(diagonal > 0.0, diagonal, 1.0)).sum(axis=2), 0.0)
         scale += counted * np.log(np.diag(fit.noise.whitening)).sum()
         return np.sum(scale - 0.5 * np.sum(white**2, axis=1), axis=1)
 
     def errors_of(self, batch: ModelBatch, levels: NoiseLevels, model: Model) -> np.ndarray:
         """Innovations, shape (P, R, m, K + 1)."""
-        gains = self.follower.gains(levels, model)
+        gains = self.innovations_model.gains(levels, model)
         same = np.zeros(batch.size, dtype=np.int64)
-        return self.follower.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
+        return self.innovations_model.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
 
-    def noise_of(self, errors: np.ndarray, levels: NoiseLevels, model: Model) -> list[Colour]:
-        """The colour of each model's innovations."""
-        scale = _log_determinant(self.follower.gains(levels, model).whitening, self.log)
-        colours = [colour_of(each, self.log) for each in errors]
-        return [replace(colour, log_likelihood=colour.log_likelihood + scale) for colour in colours]
+    def noise_of(self, errors: np.ndarray, levels: NoiseLevels, model: Model) -> list[NoiseModel]:
+        """The noise model of each model's innovations."""
+        scale = _log_determinant(self.innovations_model.gains(levels, model).whitening, self.data)
+        colours = [noise_model_of(each, self.data) for each in errors]
+        return [replace(noise_model, log_likelihood=noise_model.log_likelihood + scale) for noise_model in colours]
 
-    def whitened(self, errors: np.ndarray, noise: Colour) -> np.ndarray:
+    def whitened(self, errors: np.ndarray, noise: NoiseModel) -> np.ndarray:
         """White innovations, shape (P, R, m, K + 1)."""
-        return whitened(errors, noise, self.log)
+        return whitened(errors, noise, self.data)
 
     def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
@@ -178,7 +178,7 @@ class InnovationFitter(Fitter):
     def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
         """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
         kinds = {name.partition("/")[2] for name in model.effects}
-        matters = self.log.has_means and not kinds.isdisjoint(THRESHOLDS)
+        matters = self.data.has_means and not kinds.isdisjoint(THRESHOLDS)
         if matters == (levels.spread > 0.0):
             return levels
         return replace(levels, spread=1.0 if matters else 0.0)
@@ -207,29 +207,31 @@ class InnovationFitter(Fitter):
     def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
         """Log-likelihoods of hypotheses of the same effects, as they are."""
         cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
-        gains = [self.follower.gains(levels, hypothesis.model) for hypothesis in hypotheses]
+        gains = [self.innovations_model.gains(levels, hypothesis.model) for hypothesis in hypotheses]
         alike = np.array([next(i for i, other in enumerate(gains) if other is own) for own in gains])
         different, group = np.unique(alike, return_inverse=True)
         observers = tuple(gains[i] for i in different)
         batch = hypotheses[0].space.batch(cubes)
-        innovations = self.follower.innovations(batch, observers, group, np.full(batch.size, levels.spread))
-        scales = [_log_determinant(observer.whitening, self.follower.log) for observer in observers]
+        innovations = self.innovations_model.innovations(batch, observers, group, np.full(batch.size, levels.spread))
+        scales = [_log_determinant(observer.whitening, self.innovations_model.data) for observer in observers]
         priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
-        log = self.follower.log
-        likelihoods = np.array([colour_of(each, log).log_likelihood for each in innovations]) - priors
+        data = self.innovations_model.data
+        likelihoods = np.array([noise_model_of(each, data).log_likelihood for each in innovations]) - priors
         return likelihoods + np.array(scales)[group]
 
     def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[float]:
         """Log-likelihoods of one model with several noise levels."""
-        log = self.follower.log
-        gains = self.follower.gains_of(levels, hypothesis.model)
+        data = self.innovations_model.data
+        gains = self.innovations_model.gains_of(levels, hypothesis.model)
         count = len(levels)
         batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
         spread = np.array([level.spread for level in levels])
-        innovations = self.follower.innovations(batch, gains, np.arange(count), spread)
+        innovations = self.innovations_model.innovations(batch, gains, np.arange(count), spread)
         priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
         return [
-            _log_determinant(g.whitening, log) + colour_of(each, log).log_likelihood - 0.5 * float(priors @ priors)
+            _log_determinant(g.whitening, data)
+            + noise_model_of(each, data).log_likelihood
+            - 0.5 * float(priors @ priors)
             for g, each in zip(gains, innovations, strict=True)
         ]
 
@@ -277,7 +279,7 @@ def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.n
     return move
 
 
-def _log_determinant(whitening: np.ndarray, log) -> float:
+def _log_determinant(whitening: np.ndarray, data) -> float:
     """Sum of log det of the whitening over the rows that count."""
-    diagonal = np.einsum("krcc->krc", whitening)[log.counted]
+    diagonal = np.einsum("krcc->krc", whitening)[data.counted]
     return float(np.log(diagonal.prod(axis=1)).sum())

@@ -9,7 +9,7 @@ import numpy as np
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along
 from wipx.identify.prediction import true_state
 from wipx.sim.analytic import AnalyticSimulator, Observer
@@ -24,24 +24,24 @@ MOST_KNOWN = 20  # gains that are kept; each holds as much as some ten recording
 
 
 @dataclass(frozen=True)
-class Follower:
+class InnovationsModel:
     """Follows recordings with any model.
 
     Attributes:
         simulator: The engine.
-        log: The recordings.
+        data: The recordings.
         linear: The nominal body about the places that they visit.
     """
 
     simulator: AnalyticSimulator
-    log: Log
+    data: RecordingBatch
     linear: Linearisation
     _known: dict[tuple[bytes, tuple[float, ...]], Gains] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
-    def of(cls, simulator: AnalyticSimulator, log: Log, nominal: Model) -> "Follower":
-        """A follower of recordings whose gains are those of the nominal body."""
-        return cls(simulator, log, linearise_along(nominal, log.measured[:, : log.joints]))
+    def of(cls, simulator: AnalyticSimulator, data: RecordingBatch, nominal: Model) -> "InnovationsModel":
+        """An observer of recordings whose gains are those of the nominal body."""
+        return cls(simulator, data, linearise_along(nominal, data.measured[:, : data.joints]))
 
     def gains(self, levels: NoiseLevels, model: Model) -> Gains:
         """Gains for noise levels and for the sensor delays of a model."""
@@ -57,7 +57,7 @@ class Follower:
             if len(self._known) > MOST_KNOWN:
                 self._known.clear()
                 return self.gains_of(levels, model)
-            found = observer_gains(self.linear, self.log, list(missing.values()), delays)
+            found = observer_gains(self.linear, self.data, list(missing.values()), delays)
             self._known.update(zip(missing, found, strict=True))
         return tuple(self._known[key] for key in keys)
 
@@ -70,17 +70,17 @@ class Follower:
             batch: P models.
             gains: Of one or more observers.
             group: Which of them each model has, shape (P,).
-            spread: Of the single commands, in multiples of `Log.command_spread`, shape (P,).
+            spread: Of the single commands, in multiples of `RecordingBatch.command_spread`, shape (P,).
         """
-        log = self.log
+        data = self.data
         shown = self._shown(batch, gains, group, spread)
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
-        found = np.zeros((batch.size, len(log.recordings), log.signals, len(log.rows)))
+        found = np.zeros((batch.size, len(data.recordings), data.signals, len(data.rows)))
         _innovations(
-            log.measured, shown.coordinates, shown.rates, log.channels, whitening, group, log.inputs.last, found
+            data.measured, shown.coordinates, shown.rates, data.channels, whitening, group, data.inputs.last, found
         )
         if shown.delivered is not None:
-            _report_errors(log.reported, shown.delivered, log.counted, log.inputs.last, len(log.channels), found)
+            _report_errors(data.reported, shown.delivered, data.counted, data.inputs.last, len(data.channels), found)
         return found
 
     def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
@@ -93,28 +93,28 @@ class Follower:
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         return self.simulator.follow(
             batch,
-            self.log.inputs,
+            self.data.inputs,
             start,
             Observer(
-                self.log.measured,
+                self.data.measured,
                 corrections,
                 group,
-                np.outer(spread, self.log.command_spread),
-                reports=self.log.reported.shape[1] > 0,
+                np.outer(spread, self.data.command_spread),
+                reports=self.data.reported.shape[1] > 0,
             ),
         )
 
     @cached_property
     def _first_rows(self) -> np.ndarray:
         """Recorded coordinates and mean rates at each recording's start, shape (2 joints, R)."""
-        log = self.log
-        first = log.measured[0].copy()
+        data = self.data
+        first = data.measured[0].copy()
         for r in range(first.shape[1]):
-            t = log.inputs.t[:, r] - log.inputs.t[0, r]
-            count = min(max(4, int(np.searchsorted(t, GUESS_SPAN))), int(log.inputs.last[r]) + 1)
-            for j in range(log.joints):
-                fit = np.polynomial.polynomial.polyfit(t[:count], log.measured[:count, j, r], min(2, count - 1))
-                first[[j, log.joints + j], r] = fit[0], fit[1]
+            t = data.inputs.t[:, r] - data.inputs.t[0, r]
+            count = min(max(4, int(np.searchsorted(t, GUESS_SPAN))), int(data.inputs.last[r]) + 1)
+            for j in range(data.joints):
+                fit = np.polynomial.polynomial.polyfit(t[:count], data.measured[:count, j, r], min(2, count - 1))
+                first[[j, data.joints + j], r] = fit[0], fit[1]
         return first
 
 

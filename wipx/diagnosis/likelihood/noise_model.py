@@ -1,4 +1,4 @@
-"""The colour of innovations: an autoregression that turns them into white noise.
+"""The noise of innovations: an autoregression that turns them into white noise.
 
 A fixed observer leaves innovations that are a stationary linear process whatever the sensors' noise is;
 least squares on their past makes them white (Box, Jenkins 1976, Time Series Analysis), and the
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.sim.cache import cached
 
 SURPRISES = 2  # rows before the present whose commands may know of its noise
@@ -19,12 +19,12 @@ NO_SURPRISES = np.zeros((1, 0, 1))
 
 
 @dataclass(frozen=True)
-class Colour:
+class NoiseModel:
     """An autoregression of innovations.
 
     Attributes:
-        weights: From past innovations, then from the commands' surprises (see `Log.surprises`), to the present,
-            shape (len(LAGS) m + SURPRISES inputs, m).
+        weights: From past innovations, then from the commands' surprises (see `RecordingBatch.surprises`), to the
+            present, shape (len(LAGS) m + SURPRISES inputs, m).
         whitening: Inverse Cholesky factor of what it leaves, shape (m, m).
         log_likelihood: Of the innovations that it was fitted to, up to a constant.
         reported: The part of it that is the reported forces'.
@@ -36,40 +36,40 @@ class Colour:
     reported: float
 
 
-def colour_of(innovations: np.ndarray, log: Log) -> Colour:
+def noise_model_of(innovations: np.ndarray, data: RecordingBatch) -> NoiseModel:
     """The autoregression of innovations, shape (R, m, K + 1).
 
     Errors of reported forces have one of their own: what a drive reports beyond the modelled force would explain the
     motion in place of the physics that makes it.
     """
-    m, channels = log.signals, len(log.channels)
-    rows = int(log.counted.sum())
+    m, channels = data.signals, len(data.channels)
+    rows = int(data.counted.sum())
     lagged = np.tile(np.arange(m), len(LAGS))
-    motion = np.concatenate([lagged < channels, np.ones(SURPRISES * log.surprises.shape[1], dtype=bool)])
+    motion = np.concatenate([lagged < channels, np.ones(SURPRISES * data.surprises.shape[1], dtype=bool)])
     weights, whitening = np.zeros((len(motion), m)), np.zeros((m, m))
     likelihoods = []
-    for known, begin, end, surprises in ((motion, 0, channels, log.surprises), (~motion, channels, m, NO_SURPRISES)):
+    for known, begin, end, surprises in ((motion, 0, channels, data.surprises), (~motion, channels, m, NO_SURPRISES)):
         likelihoods.append(0.0)
         if end > begin:
-            products = lagged_products(innovations, begin, end, log.counted, surprises)
+            products = lagged_products(innovations, begin, end, data.counted, surprises)
             own, factor = _regressed(products, end - begin, rows)
             weights[known, begin:end] = own
             whitening[begin:end, begin:end] = np.linalg.inv(factor)
             likelihoods[-1] -= rows * float(np.log(np.diag(factor)).sum())
     # Where the model ran away innovations stand at their limit, which a regression takes for well predicted.
-    runaway = LARGEST * np.count_nonzero((np.abs(innovations) >= LARGEST) & log.counted.T[:, None])
-    return Colour(weights, whitening, sum(likelihoods) - runaway, likelihoods[1])
+    runaway = LARGEST * np.count_nonzero((np.abs(innovations) >= LARGEST) & data.counted.T[:, None])
+    return NoiseModel(weights, whitening, sum(likelihoods) - runaway, likelihoods[1])
 
 
-def whitened(innovations: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
+def whitened(innovations: np.ndarray, noise_model: NoiseModel, data: RecordingBatch) -> np.ndarray:
     """White innovations of (P, R, m, K + 1), of the same shape; zero at rows that do not count."""
-    return _whitened(innovations, log.counted, LAGS, log.surprises, colour.weights, colour.whitening)
+    return _whitened(innovations, data.counted, LAGS, data.surprises, noise_model.weights, noise_model.whitening)
 
 
-def whitened_change(change: np.ndarray, colour: Colour, log: Log) -> np.ndarray:
+def whitened_change(change: np.ndarray, noise_model: NoiseModel, data: RecordingBatch) -> np.ndarray:
     """What a small change of innovations (P, R, m, K + 1) makes of the white ones; the commands do not change."""
-    none = np.zeros_like(log.surprises)
-    return _whitened(change, log.counted, LAGS, none, colour.weights, colour.whitening)
+    none = np.zeros_like(data.surprises)
+    return _whitened(change, data.counted, LAGS, none, noise_model.weights, noise_model.whitening)
 
 
 def lagged_products(

@@ -14,7 +14,7 @@ from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 
-ROUGH = ("backlash",)
+NON_SMOOTH = ("backlash",)
 DELAY, LATE = "actuator/delay", "actuator/backlash.contact_time"
 RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
@@ -37,7 +37,7 @@ def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
 
     It looks like others of the drive. A delay is none of them: flanks that give way are late themselves.
     """
-    return is_rough(fit) and any(effect.startswith("actuator/") and effect != DELAY for effect in added)
+    return is_non_smooth(fit) and any(effect.startswith("actuator/") and effect != DELAY for effect in added)
 
 
 def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
@@ -53,7 +53,7 @@ def hides(fit: Fit, effect: str) -> bool:
 
 def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
     """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
-    intervals = fitter.log.intervals
+    intervals = fitter.data.intervals
     row = max(float(np.median(intervals[intervals > 0.0])), FASTEST)
     guesses = np.arange(row, max(PER_ROW * LONGEST, 2.0 * row), row) / PER_ROW
     values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)
@@ -67,14 +67,14 @@ def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypot
     return [tried[i] for i in highest]
 
 
-def is_rough(fit: Fit) -> bool:
+def is_non_smooth(fit: Fit) -> bool:
     """Whether a fit has an effect that makes the likelihood rough."""
-    return any(effect.partition("/")[2] in ROUGH for effect in fit.effects)
+    return any(effect.partition("/")[2] in NON_SMOOTH for effect in fit.effects)
 
 
-def explored(fitter: Fitter, fit: Fit) -> Fit:
+def searched_by_trial(fitter: Fitter, fit: Fit) -> Fit:
     """A fit, or a better one at the same noise with other numbers of its rough effects, where it has any."""
-    if not is_rough(fit):
+    if not is_non_smooth(fit):
         return fit
     space = fit.hypothesis.space
     rough, ridge, powers = _numbers(fit)
@@ -106,7 +106,7 @@ def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
         Shape (at least 1, D).
     """
     found = [fit.hypothesis.cube]
-    if is_rough(fit):
+    if is_non_smooth(fit):
         space = fit.hypothesis.space
         _, ridge, powers = _numbers(fit)
         least = fit.log_likelihood - float(np.clip(SHARE * explained, CHANCE, MOST))
@@ -122,7 +122,7 @@ def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
 def _numbers(fit: Fit) -> tuple[list[int], list[int], np.ndarray]:
     """Indices of the rough effects' numbers, of those along the ridge, and the powers with which these change there."""
     names = fit.hypothesis.space.names
-    rough = [i for e in fit.effects if e.partition("/")[2] in ROUGH for i in fit.hypothesis.parameters_of(e)]
+    rough = [i for e in fit.effects if e.partition("/")[2] in NON_SMOOTH for i in fit.hypothesis.parameters_of(e)]
     ridge = [i for i in rough if names[i].rpartition(".")[2] in RIDGE]
     return rough, ridge, np.array([1.0 if names[i].endswith(f".{RIDGE[0]}") else -1.0 for i in ridge])
 

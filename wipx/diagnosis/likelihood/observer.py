@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.diagnosis.likelihood.recording_batch import SETTLES, Log
+from wipx.diagnosis.likelihood.recording_batch import SETTLES, RecordingBatch
 from wipx.identify.linearisation import Linearisation, transition_over
 from wipx.sim.cache import cached
 
@@ -28,7 +28,7 @@ class NoiseLevels:
         force: On each joint, shape (joints,), spectral [N s^0.5 or N m s^0.5].
         sensor: Of each recorded channel, shape (m,) [unit of the column].
         spread: Half width by which single commands scatter about the mean that the log has, in multiples of
-            `Log.command_spread`.
+            `RecordingBatch.command_spread`.
     """
 
     force: np.ndarray
@@ -50,31 +50,31 @@ class Gains:
 
 
 def observer_gains(
-    linear: Linearisation, log: Log, levels: Sequence[NoiseLevels], delays: tuple[float, ...] | None = None
+    linear: Linearisation, data: RecordingBatch, levels: Sequence[NoiseLevels], delays: tuple[float, ...] | None = None
 ) -> tuple[Gains, ...]:
     """Kalman gains along every recording, for each of several noise levels.
 
     Args:
         linear: The body.
-        log: The recordings.
+        data: The recordings.
         levels: Noise.
         delays: Delay of each coordinate's sensor [s]; None for none.
     """
-    late = np.zeros(log.joints) if delays is None else np.array(delays)
-    n, m = 2 * log.joints, len(log.channels)
-    gains = np.zeros((len(levels), *log.rows.shape, n, n))
-    whitening = np.zeros((len(levels), *log.rows.shape, m, m))
+    late = np.zeros(data.joints) if delays is None else np.array(delays)
+    n, m = 2 * data.joints, len(data.channels)
+    gains = np.zeros((len(levels), *data.rows.shape, n, n))
+    whitening = np.zeros((len(levels), *data.rows.shape, m, m))
     _riccati(
         linear.a,
         linear.b,
         linear.place,
-        log.intervals,
-        log.inputs.last,
-        log.channels,
+        data.intervals,
+        data.inputs.last,
+        data.channels,
         np.array([level.force**2 for level in levels]),
         np.array([level.sensor**2 for level in levels]),
         late,
-        log.inputs.t - log.inputs.t[0],
+        data.inputs.t - data.inputs.t[0],
         gains,
         whitening,
     )

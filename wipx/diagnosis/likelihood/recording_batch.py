@@ -15,7 +15,7 @@ SETTLES = 0.15  # [s] after a recording's first row, in which the state and the 
 
 
 @dataclass(frozen=True)
-class Log:
+class RecordingBatch:
     """R recordings of a plant.
 
     Attributes:
@@ -38,7 +38,7 @@ class Log:
     left_out: int | None = None
 
     @classmethod
-    def of(cls, recordings: tuple[Recording, ...], plant: Plant) -> "Log":
+    def of(cls, recordings: tuple[Recording, ...], plant: Plant) -> "RecordingBatch":
         """All rows; a rate counts as recorded where every recording has it."""
         names = (*plant.coordinates, *plant.rates)
         channels = [c for c, name in enumerate(names) if all(name in r for r in recordings)]
@@ -58,8 +58,8 @@ class Log:
         """Number of joints."""
         return len(self.plant.joints)
 
-    def reporting_nothing(self, like: "Log") -> "Log":
-        """With the reported forces of another log, all zero: they then tell nothing."""
+    def reporting_nothing(self, like: "RecordingBatch") -> "RecordingBatch":
+        """With the reported forces of other recordings, all zero: they then tell nothing."""
         return replace(self, reported=np.zeros((len(self.rows), like.reported.shape[1], len(self.recordings))))
 
     @property

@@ -1,6 +1,6 @@
 """Uncertainty that does not trust the noise model: sandwich estimates over stretches of time.
 
-Huber 1967; White 1982. Innovations that the colour did not make quite white, or whose size changes along
+Huber 1967; White 1982. Innovations that the noise model did not make quite white, or whose size changes along
 the run, leave scores that add up within a stretch of time; their sum over stretches shows by how
 much the plain covariance is too small.
 """
@@ -8,15 +8,15 @@ much the plain covariance is too small.
 import numpy as np
 
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 
 STRETCH = 0.5  # [s]; several times the memory of the innovations
 
 
-def stretches(log: Log) -> np.ndarray:
+def stretches(data: RecordingBatch) -> np.ndarray:
     """Number of the stretch of time of every row, shape (R, K + 1); rows that do not count share that of others."""
-    number = np.floor((log.inputs.t - log.inputs.t[0]) / STRETCH).astype(np.int64)
-    labels = np.where(log.rows, number, 0) + 1_000_000 * np.arange(log.inputs.windows)
+    number = np.floor((data.inputs.t - data.inputs.t[0]) / STRETCH).astype(np.int64)
+    labels = np.where(data.rows, number, 0) + 1_000_000 * np.arange(data.inputs.windows)
     return np.unique(labels.T, return_inverse=True)[1].reshape(labels.T.shape)
 
 

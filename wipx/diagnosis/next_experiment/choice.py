@@ -14,10 +14,10 @@ from wipx.core.diagnosis import Experiment, NextExperiment
 from wipx.diagnosis.likelihood.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.innovations_model import Follower
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance, inflation
-from wipx.diagnosis.next_experiment.excitations import Reach, how, menu, prescribed
+from wipx.diagnosis.next_experiment.excitations import Reach, excitations_for, how, prescribed
 from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, Trial, loaded
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import StateFeedback
@@ -49,7 +49,7 @@ def next_experiment(
     question: Question,
     fit: Fit,
     setting: Setting,
-    log: Log,
+    data: RecordingBatch,
     simulator: AnalyticSimulator,
     feedback: StateFeedback | None,
     rate: float,
@@ -61,7 +61,7 @@ def next_experiment(
         question: What is open.
         fit: Of the completed model.
         setting: The robot.
-        log: The recordings so far.
+        data: The recordings so far.
         simulator: The engine.
         feedback: The robot's controller; without one, commands are replayed from where the recordings start.
         rate: Of the controller [Hz].
@@ -71,16 +71,16 @@ def next_experiment(
         The menu by the separation of what stays least clear, after one run of 10 s. None where nothing is open, the
         robot cannot be simulated within its reach, or no experiment would settle anything.
     """
-    reach = Reach.of(log)
+    reach = Reach.of(data)
     closed = feedback is not None
-    bench = Bench(simulator, fit.hypothesis, log, reach, fit.levels, feedback, rate)
-    asked = _Asked.of(question, fit, log)
+    bench = Bench(simulator, fit.hypothesis, data, reach, fit.levels, feedback, rate)
+    asked = _Asked.of(question, fit, data)
     trials, separations = [], []
-    for excitation in menu(fit.hypothesis.model, reach, rng, closed=closed):
+    for excitation in excitations_for(fit.hypothesis.model, reach, rng, closed=closed):
         trial = None if excitation.mass and asked.has_payload_event else bench.tried(excitation, rng)
         if trial is not None:
-            run = Log.of((trial.recording,), log.plant).reporting_nothing(log)
-            fitter = InnovationFitter(Follower.of(simulator, run, setting.nominal))
+            run = RecordingBatch.of((trial.recording,), data.plant).reporting_nothing(data)
+            fitter = InnovationFitter(InnovationsModel.of(simulator, run, setting.nominal))
             trials.append(trial)
             separations.append(asked.separations(fitter, trial.excitation.mass))
     if not trials or not asked.count:
@@ -96,7 +96,7 @@ def next_experiment(
     ]
     order = np.argsort(-worst, kind="stable")
     best = int(order[0])
-    reference = prescribed(log.plant, trials[best].excitation, closed=closed)
+    reference = prescribed(data.plant, trials[best].excitation, closed=closed)
     return NextExperiment(question.sentence, experiments[best], tuple(experiments[i] for i in order), reference)
 
 
@@ -119,7 +119,7 @@ class _Asked:
     overstated: float
 
     @classmethod
-    def of(cls, question: Question, fit: Fit, log: Log) -> "_Asked":
+    def of(cls, question: Question, fit: Fit, data: RecordingBatch) -> "_Asked":
         names = fit.hypothesis.space.names
         numbers = tuple(names.index(name) for name in question.parameters)
         everything = list(range(len(names)))
@@ -170,7 +170,7 @@ class _View:
 
     Attributes:
         fitter: Of the run.
-        judge: The completed model with noise and colour of the recordings so far.
+        judge: The completed model with the noise model of the recordings so far.
     """
 
     fitter: InnovationFitter
@@ -197,8 +197,8 @@ class _View:
             if costs[best] >= cost:
                 break
             cube, cost = trials[best], float(costs[best])
-        log = self.fitter.log
-        values = int(log.counted.sum()) * log.signals
+        data = self.fitter.data
+        values = int(data.counted.sum()) * data.signals
         return values * float(np.log1p(cost / values))
 
     def slopes(self, hypothesis: Hypothesis, cube: np.ndarray, information: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from wipx.core.model import Model
 from wipx.core.plant import Plant
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 
 DURATION = 10.0  # [s] of an experiment
 RAMP = 1.0  # [s] within which an excitation sets in
@@ -41,11 +41,11 @@ class Reach:
     command: float
 
     @classmethod
-    def of(cls, log: Log) -> "Reach":
+    def of(cls, data: RecordingBatch) -> "Reach":
         """What the recordings show."""
-        coordinates, commands = log.plant.coordinates, log.plant.commands
-        travel = [max(float(np.ptp(r[column])) for r in log.recordings) for column in coordinates]
-        command = max(float(np.abs(r.stack(commands)).max()) for r in log.recordings)
+        coordinates, commands = data.plant.coordinates, data.plant.commands
+        travel = [max(float(np.ptp(r[column])) for r in data.recordings) for column in coordinates]
+        command = max(float(np.abs(r.stack(commands)).max()) for r in data.recordings)
         return cls(np.array(travel), command)
 
 
@@ -76,7 +76,7 @@ class Excitation:
     shrinks: bool = True
 
 
-def menu(model: Model, reach: Reach, rng: np.random.Generator, *, closed: bool) -> tuple[Excitation, ...]:
+def excitations_for(model: Model, reach: Reach, rng: np.random.Generator, *, closed: bool) -> tuple[Excitation, ...]:
     """The excitations for a robot.
 
     Args:

@@ -8,7 +8,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.observer import NoiseLevels
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.next_experiment.excitations import DURATION, Excitation, Reach, payload_height, rate_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
@@ -43,7 +43,7 @@ class Bench:
     Attributes:
         simulator: The engine.
         hypothesis: The completed model.
-        log: The recordings so far.
+        data: The recordings so far.
         reach: How far the robot went in them.
         levels: Noise.
         feedback: The controller; None without one.
@@ -52,7 +52,7 @@ class Bench:
 
     simulator: AnalyticSimulator
     hypothesis: Hypothesis
-    log: Log
+    data: RecordingBatch
     reach: Reach
     levels: NoiseLevels
     feedback: StateFeedback | None
@@ -96,8 +96,8 @@ class Bench:
 
     def _noise(self, rng: np.random.Generator) -> np.ndarray:
         """Of what the sensors show at every row of the controller, shape (K + 1, 2 joints)."""
-        deviations = np.zeros(2 * self.log.joints)
-        deviations[self.log.channels] = self.levels.sensor
+        deviations = np.zeros(2 * self.data.joints)
+        deviations[self.data.channels] = self.levels.sensor
         return rng.normal(size=(round(DURATION * self._rate) + 1, len(deviations))) * deviations
 
     @property
@@ -107,7 +107,7 @@ class Bench:
 
     @property
     def _log_rate(self) -> float:
-        return float(np.median([r.rate for r in self.log.recordings]))
+        return float(np.median([r.rate for r in self.data.recordings]))
 
     def _recorded(self, excitation: Excitation, noise: np.ndarray) -> Recording:
         plant = self.model.plant
@@ -118,7 +118,7 @@ class Bench:
         at = np.arange(0, rows - every, every)
         shown = np.concatenate([run.coordinates, run.rates], axis=1)[:, :, 0, 0] + noise
         names = (*plant.coordinates, *plant.rates)
-        columns = {"t": inputs.t[at, 0], **{names[c]: shown[at, c] for c in self.log.channels}}
+        columns = {"t": inputs.t[at, 0], **{names[c]: shown[at, c] for c in self.data.channels}}
         for c, name in enumerate(plant.commands):
             columns[name] = run.commands[: rows - every, c, 0, 0].reshape(-1, every).mean(axis=1)
         return Recording(excitation.name, columns, "simulated", every)
@@ -131,7 +131,7 @@ class Bench:
         course = excitation.size * excitation.course(t)
         initial = np.zeros((2 * joints, 1, 1))
         if self.feedback is None:
-            initial[:joints, 0, 0] = [np.median([r[c][0] for r in self.log.recordings]) for c in plant.coordinates]
+            initial[:joints, 0, 0] = [np.median([r[c][0] for r in self.data.recordings]) for c in plant.coordinates]
             commands = np.repeat(course[:, None, None], len(plant.commands), axis=1)
             return self.simulator.replay(batch, replace(inputs, commands=commands), initial)
         initial[joints - 1] = excitation.tilt

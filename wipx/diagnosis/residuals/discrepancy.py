@@ -11,8 +11,8 @@ from wipx.core.diagnosis import Curve
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.recording_batch import Log
-from wipx.diagnosis.residuals.residual_tests import Leftover, Shape, leftovers
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests
 from wipx.effects.remainder import COMMANDS, KNOTS, TIME
 from wipx.sim.coefficients import joint_index
 
@@ -51,41 +51,43 @@ def process_mean(slopes: np.ndarray, white: np.ndarray, knots: np.ndarray) -> tu
     return -covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
-def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, leftover: Leftover) -> tuple[Fit, np.ndarray]:
+def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, residual: Residual) -> tuple[Fit, np.ndarray]:
     """A fit with a force over one signal added, refined, and the force's standard deviation at the knots."""
-    shape = leftover.shape
-    name = f"{fitter.log.plant.joints[shape.joint]}/remainder"
+    shape = residual.shape
+    name = f"{fitter.data.plant.joints[shape.joint]}/remainder"
     force = np.zeros(KNOTS)
-    log = fitter.log
-    current = fitter.fit(with_force(setting, fit, name, shape, force, log), fit.levels, steps=0)
+    data = fitter.data
+    current = fitter.fit(with_force(setting, fit, name, shape, force, data), fit.levels, steps=0)
     spread = np.zeros(KNOTS)
     for _ in range(ROUNDS):
-        again = leftovers(fitter, current, [shape])[0]
+        again = residual_tests(fitter, current, [shape])[0]
         change, spread = process_mean(again.slopes, current.white.ravel(), shape.knots)
         force = force + change
-        found = fitter.fit(with_force(setting, fit, name, shape, force, log), current.levels, steps=3)
+        found = fitter.fit(with_force(setting, fit, name, shape, force, data), current.levels, steps=3)
         if found.log_likelihood < current.log_likelihood + 0.5:
             break
         current = found
     return fitter.polished(current, rounds=2), spread
 
 
-def with_force(setting: Setting, fit: Fit, name: str, shape: Shape, force: np.ndarray, log: Log) -> Hypothesis:
+def with_force(
+    setting: Setting, fit: Fit, name: str, shape: Shape, force: np.ndarray, data: RecordingBatch
+) -> Hypothesis:
     """The hypothesis of a fit, on a nominal model that has the force."""
     values = {
-        "signal": float(_code(shape, log)),
+        "signal": float(_code(shape, data)),
         "factor": FACTORS[shape.kind],
         "low": float(shape.knots[0]),
         "high": float(shape.knots[-1]),
         **{f"f{i}": float(f) for i, f in enumerate(force)},
     }
-    richer = Setting(setting.nominal.with_effects({name: values}), setting.uncertainty, setting.scales)
-    return Hypothesis.of(richer, fit.effects, fit.hypothesis.values)
+    extended_effects = Setting(setting.nominal.with_effects({name: values}), setting.uncertainty, setting.scales)
+    return Hypothesis.of(extended_effects, fit.effects, fit.hypothesis.values)
 
 
-def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, log: Log) -> Curve:
+def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, data: RecordingBatch) -> Curve:
     """The force as a person reads it."""
-    plant = log.plant
+    plant = data.plant
     site = plant.joints[shape.joint]
     values = fit.hypothesis.model.effects[f"{site}/remainder"]
     force = np.array([values[f"f{i}"] for i in range(KNOTS)])
@@ -104,8 +106,8 @@ def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, log: Log) -> Curve:
     )
 
 
-def _code(shape: Shape, log: Log) -> int:
-    plant = log.plant
+def _code(shape: Shape, data: RecordingBatch) -> int:
+    plant = data.plant
     if shape.signal in plant.coordinates:
         return joint_index(plant.joints[plant.coordinates.index(shape.signal)])
     if shape.signal in plant.rates:

@@ -14,7 +14,7 @@ from wipx.core.diagnosis import HorizonErrors, LeftForce
 from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.results import Trace
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import linearise_along
 from wipx.identify.smoothing import Smoother
 from wipx.sim.analytic import AnalyticSimulator
@@ -51,58 +51,60 @@ def _since_start(trace: Trace) -> np.ndarray:
     return np.where(last >= 0, trace.t - trace.starts[np.maximum(last, 0)], np.nan)
 
 
-def left_forces(simulator: AnalyticSimulator, log: Log, noise: np.ndarray, model: Model) -> tuple[LeftForce, ...]:
+def left_forces(
+    simulator: AnalyticSimulator, data: RecordingBatch, noise: np.ndarray, model: Model
+) -> tuple[LeftForce, ...]:
     """The force that a model lacks on each joint.
 
     Args:
         simulator: The engine.
-        log: The recordings.
+        data: The recordings.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
         model: The completed model.
     """
-    plant = log.plant
-    smoother = Smoother(simulator, plant, log.recordings, noise)
-    bandwidth = np.full(log.joints, BANDWIDTH)
+    plant = data.plant
+    smoother = Smoother(simulator, plant, data.recordings, noise)
+    bandwidth = np.full(data.joints, BANDWIDTH)
     states = smoother.along(model, bandwidth)
     missing = smoother.disturbance(model, bandwidth)
-    linear = linearise_along(model, log.measured[:, : log.joints])
+    linear = linearise_along(model, data.measured[:, : data.joints])
     forces = np.einsum("krij,kjr->kir", np.linalg.inv(linear.b)[linear.place], missing)
     found = []
     for j, site in enumerate(plant.joints):
-        force = np.where(log.counted, forces[:, j], 0.0)
-        kind, signal, period, share = _what(plant, log, states, force, j)
-        size = float(np.sqrt(np.mean(force[log.counted] ** 2)))
+        force = np.where(data.counted, forces[:, j], 0.0)
+        kind, signal, period, share = _what(plant, data, states, force, j)
+        size = float(np.sqrt(np.mean(force[data.counted] ** 2)))
         unit = "N m" if plant.is_angular(site) else "N"
-        found.append(LeftForce(site, size, unit, _lasting(force, log), kind, signal, period, share))
+        found.append(LeftForce(site, size, unit, _lasting(force, data), kind, signal, period, share))
     return tuple(found)
 
 
 def _what(
-    plant: Plant, log: Log, states: np.ndarray, force: np.ndarray, joint: int
+    plant: Plant, data: RecordingBatch, states: np.ndarray, force: np.ndarray, joint: int
 ) -> tuple[str, str | None, float | None, float]:
     """What a force goes with best: kind, signal, period of the signal, and share of its variance; or "random"."""
     best: tuple[str, str | None, float | None, float] = ("random", None, None, 0.0)
-    for kind, signal, period, columns in _families(plant, log, states, joint):
-        share = _share(columns, force, log)
+    for kind, signal, period, columns in _families(plant, data, states, joint):
+        share = _share(columns, force, data)
         if share > max(best[3], TELLING):
             best = (kind, signal, period, share)
     return best
 
 
 def _families(
-    plant: Plant, log: Log, states: np.ndarray, joint: int
+    plant: Plant, data: RecordingBatch, states: np.ndarray, joint: int
 ) -> Iterator[tuple[str, str | None, float | None, np.ndarray]]:
     """Forces of unit size at every row, family by family: kind, signal, period, and columns (C, K + 1, R)."""
-    time = log.inputs.t - log.inputs.t[0]
+    time = data.inputs.t - data.inputs.t[0]
     names = (*plant.coordinates, *plant.rates)
     for name, values in zip(names, np.moveaxis(states, 1, 0), strict=True):
-        yield "law", name, None, _hats(values, log.rows)
-    commands = np.concatenate([log.inputs.commands, log.inputs.commands[-1:]])
+        yield "law", name, None, _hats(values, data.rows)
+    commands = np.concatenate([data.inputs.commands, data.inputs.commands[-1:]])
     for name, values in zip(plant.commands, np.moveaxis(commands, 1, 0), strict=True):
-        yield "law", name, None, _hats(values, log.rows)
-        yield "gain", name, None, _hats(time, log.rows) * values
+        yield "law", name, None, _hats(values, data.rows)
+        yield "gain", name, None, _hats(time, data.rows) * values
     for name, values in ((plant.coordinates[joint], states[:, joint]), ("t", time)):
-        way = max(float(np.ptp(values[log.rows])), 1e-9)
+        way = max(float(np.ptp(values[data.rows])), 1e-9)
         for wave in WAVES[3:]:
             angle = 2.0 * np.pi * wave / way * values
             columns = np.stack([np.cos(angle), np.sin(angle)])
@@ -115,12 +117,12 @@ def _hats(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(values, knots, row) for row in np.eye(len(knots))])
 
 
-def _share(columns: np.ndarray, force: np.ndarray, log: Log) -> float:
+def _share(columns: np.ndarray, force: np.ndarray, data: RecordingBatch) -> float:
     """Share of a force's variance that a family explains on stretches of time that it was not fitted to."""
-    number = np.floor((log.inputs.t - log.inputs.t[0]) / STRETCH).astype(np.int64)
+    number = np.floor((data.inputs.t - data.inputs.t[0]) / STRETCH).astype(np.int64)
     left = total = 0.0
     for parity in (0, 1):
-        seen, unseen = (log.counted & (number % 2 == side) for side in (parity, 1 - parity))
+        seen, unseen = (data.counted & (number % 2 == side) for side in (parity, 1 - parity))
         if not seen.any() or not unseen.any():
             return 0.0
         weights = np.linalg.lstsq(columns[:, seen].T, force[seen], rcond=1e-6)[0]
@@ -129,9 +131,9 @@ def _share(columns: np.ndarray, force: np.ndarray, log: Log) -> float:
     return max(0.0, 1.0 - left / total) if total > 0.0 else 0.0
 
 
-def _lasting(force: np.ndarray, log: Log) -> float:
+def _lasting(force: np.ndarray, data: RecordingBatch) -> float:
     """Time in which the correlation of a force with itself falls to 1/e [s]."""
-    interval = float(np.median(log.intervals[log.intervals > 0.0]))
+    interval = float(np.median(data.intervals[data.intervals > 0.0]))
     variance = float(np.sum(force**2))
     for lag in range(1, len(force) - 1):
         if float(np.sum(force[lag:] * force[:-lag])) <= variance / np.e:

@@ -15,7 +15,7 @@ from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import direction, motion_of, response
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import stretches, sums_over
 from wipx.effects.remainder import KNOTS
 from wipx.sim.cache import cached
@@ -46,7 +46,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Leftover:
+class Residual:
     """A family of forces that a fit leaves over.
 
     Attributes:
@@ -64,23 +64,23 @@ class Leftover:
 
 def shapes_of(fitter: InnovationFitter, fit: Fit) -> list[Shape]:
     """All families of forces that are looked at, over the motion as a fit sees it."""
-    log = fitter.log
+    data = fitter.data
     signals = motion_of(fitter, fit)
     found = []
-    for joint, site in enumerate(log.plant.joints):
+    for joint, site in enumerate(data.plant.joints):
         for name, values in signals.items():
-            knots, hats = _hats(values, log.rows)
+            knots, hats = _hats(values, data.rows)
             if knots is not None:
                 found.append(Shape(joint, "force", name, knots, hats))
-                if name in _wearing(log.plant, joint):
-                    towards = direction(signals[log.plant.rates[joint]], log.rows)
+                if name in _wearing(data.plant, joint):
+                    towards = direction(signals[data.plant.rates[joint]], data.rows)
                     found.append(Shape(joint, "friction", name, knots, -hats * towards))
-        if site in log.plant.actuated:
-            command = signals[log.plant.commands[log.plant.actuated.index(site)]]
-            knots, hats = _hats(signals["t"], log.rows)
+        if site in data.plant.actuated:
+            command = signals[data.plant.commands[data.plant.actuated.index(site)]]
+            knots, hats = _hats(signals["t"], data.rows)
             if knots is not None:
                 found.append(Shape(joint, "gain", "t", knots, hats * command))
-        forces, rates = _swings(log, joint, signals)
+        forces, rates = _swings(data, joint, signals)
         found += [
             Shape(joint, "resonance", f"{frequency:.2g}", np.zeros(0), np.stack([forces[i], rates[i]]))
             for i, frequency in enumerate(FREQUENCIES)
@@ -88,20 +88,20 @@ def shapes_of(fitter: InnovationFitter, fit: Fit) -> list[Shape]:
     return found
 
 
-def leftovers(fitter: InnovationFitter, fit: Fit, shapes: list[Shape]) -> list[Leftover]:
+def residual_tests(fitter: InnovationFitter, fit: Fit, shapes: list[Shape]) -> list[Residual]:
     """What each family of forces would add to a fit, the most significant first."""
     white = fit.white.ravel()
     own = fit.jacobian[: white.size]
     basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
     left = white - basis @ (basis.T @ white)
-    labels = np.repeat(stretches(fitter.log)[:, None], fit.white.shape[1], axis=1).ravel()
+    labels = np.repeat(stretches(fitter.data)[:, None], fit.white.shape[1], axis=1).ravel()
     found = [_tested(fitter, fit, shape, basis, left, labels) for shape in shapes]
-    return sorted(found, key=lambda leftover: leftover.p_value)
+    return sorted(found, key=lambda residual: residual.p_value)
 
 
 def _tested(
     fitter: InnovationFitter, fit: Fit, shape: Shape, basis: np.ndarray, left: np.ndarray, labels: np.ndarray
-) -> Leftover:
+) -> Residual:
     slopes = response(fitter, fit, shape.joint, shape.columns)
     slopes = slopes - basis @ (basis.T @ slopes)
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
@@ -115,7 +115,7 @@ def _tested(
     inflation = max(1.0, float(np.mean(np.sum(parts**2, axis=0))))
     degrees = int(np.linalg.matrix_rank(normal, tol=1e-6))
     p_value = chdtrc(degrees, 2.0 * gain / inflation)
-    return Leftover(shape, gain, float(p_value), slopes)
+    return Residual(shape, gain, float(p_value), slopes)
 
 
 def _wearing(plant: Plant, joint: int) -> tuple[str, ...]:
@@ -135,11 +135,11 @@ def _hats(values: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray | None, np.n
     return knots, hats * rows
 
 
-def _swings(log: Log, joint: int, signals: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _swings(data: RecordingBatch, joint: int, signals: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Force of a unit mass that swings along with a joint, and its rate, shape (len(FREQUENCIES), K + 1, R) each."""
-    q, rate = signals[log.plant.coordinates[joint]], signals[log.plant.rates[joint]]
+    q, rate = signals[data.plant.coordinates[joint]], signals[data.plant.rates[joint]]
     pulsation = 2.0 * np.pi * FREQUENCIES
-    return _swung(q, rate, log.intervals, pulsation, DAMPING)
+    return _swung(q, rate, data.intervals, pulsation, DAMPING)
 
 
 @cached

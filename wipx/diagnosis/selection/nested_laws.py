@@ -4,7 +4,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.recording_batch import Log
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance
 from wipx.effects.catalogue import effect_of, vocabulary
 from wipx.identify.noise import quantisation, sensor_noise
@@ -28,10 +28,10 @@ CERTAIN = 2.0  # standard deviations
 ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
 
 
-def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
+def reduced_effects(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
     """The effects of a fit with one law replaced by the simpler one that it amounts to; None where it does not."""
     for effect in fit.effects:
-        kind = _amounts_to(effect, fit, log)
+        kind = _amounts_to(effect, fit, data)
         if kind is not None:
             other = f"{effect.partition('/')[0]}/{kind}"
             rest = tuple(other if e == effect else e for e in fit.effects)
@@ -40,7 +40,7 @@ def simpler(fit: Fit, log: Log) -> tuple[str, ...] | None:
     return None
 
 
-def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None:
+def reduced_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None:
     """The simple law that an effect contains; None where it contains none, or none that may stand beside the others."""
     site, _, kind = effect.partition("/")
     simple = f"{site}/{CONTAINS[kind]}" if kind in CONTAINS else None
@@ -49,25 +49,25 @@ def simple_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None
     return None if excluded else simple
 
 
-def parted(fit: Fit, log: Log) -> tuple[str, ...] | None:
+def effects_in_parts(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
     """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
     plant = fit.hypothesis.model.plant
     for effect in fit.effects:
         parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
         rest = tuple(e for e in fit.effects if e != effect and e not in parts)
-        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, log):
+        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, data):
             return (*rest, *parts)
     return None
 
 
-def _hardly_slips(effect: str, fit: Fit, log: Log) -> bool:
+def _hardly_slips(effect: str, fit: Fit, data: RecordingBatch) -> bool:
     """Whether a bristle bends by a good part of what its joint travels before it slips."""
     value = fit.hypothesis.values
-    travel = float(np.ptp(log.measured[:, log.plant.joints.index(effect.partition("/")[0])][log.rows]))
+    travel = float(np.ptp(data.measured[:, data.plant.joints.index(effect.partition("/")[0])][data.rows]))
     return value[f"{effect}.F_c"] > HARDLY * travel * value[f"{effect}.stiffness"]
 
 
-def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
+def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
     """The effects of a fit with a law from beyond the vocabulary, the last, in the place of one that it contains.
 
     With values to start from; None where no such law is known.
@@ -82,7 +82,7 @@ def richer(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float
     return (*(e for e in fit.effects if e != effect), law), starts
 
 
-def simple_values(fit: Fit) -> dict[str, float]:
+def reduced_values(fit: Fit) -> dict[str, float]:
     """Numbers of the fit's rich laws as those of the simple ones that they contain."""
     found = {}
     for name, value in fit.hypothesis.values.items():
@@ -96,32 +96,32 @@ def simple_values(fit: Fit) -> dict[str, float]:
     return found
 
 
-def _amounts_to(effect: str, fit: Fit, log: Log) -> str | None:
+def _amounts_to(effect: str, fit: Fit, data: RecordingBatch) -> str | None:
     site, _, kind = effect.partition("/")
     value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
     if kind == "presliding":
-        visible = INVISIBLE * _resolution(site, log)
+        visible = INVISIBLE * _resolution(site, data)
         return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
     if kind == "stribeck":
-        return "coulomb" if not _peak_is_certain(effect, fit, log) else None
+        return "coulomb" if not _peak_is_certain(effect, fit, data) else None
     if kind == "speed_limit":
-        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(log) else None
+        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(data) else None
     if kind == "payload_event":
-        return "payload" if value["t0"] <= float(log.inputs.t[0].max()) + 0.15 else None
+        return "payload" if value["t0"] <= float(data.inputs.t[0].max()) + 0.15 else None
     if kind == "sticky_spot":
-        travel = log.measured[:, 0][log.rows]
+        travel = data.measured[:, 0][data.rows]
         inside = np.mean((travel >= value["lo"]) & (travel <= value["hi"]))
         return "coulomb" if inside > ALL_OVER else None
     return None
 
 
-def _resolution(site: str, log: Log) -> float:
-    joint = log.plant.joints.index(site)
-    series = [r[log.plant.coordinates[joint]] for r in log.recordings]
-    return max(quantisation(series), float(sensor_noise(log.recordings, log.plant)[joint]))
+def _resolution(site: str, data: RecordingBatch) -> float:
+    joint = data.plant.joints.index(site)
+    series = [r[data.plant.coordinates[joint]] for r in data.recordings]
+    return max(quantisation(series), float(sensor_noise(data.recordings, data.plant)[joint]))
 
 
-def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
+def _peak_is_certain(effect: str, fit: Fit, data: RecordingBatch) -> bool:
     """Whether static and Coulomb level differ by more than chance."""
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     static, level = space.names.index(f"{effect}.F_s"), space.names.index(f"{effect}.F_c")
@@ -132,11 +132,11 @@ def _peak_is_certain(effect: str, fit: Fit, log: Log) -> bool:
     return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit) @ slope))
 
 
-def _top_speed(log: Log) -> float:
-    joint = log.plant.joints.index(log.plant.actuated[0])
+def _top_speed(data: RecordingBatch) -> float:
+    joint = data.plant.joints.index(data.plant.actuated[0])
     speeds = []
-    for r in log.recordings:
-        q = r[log.plant.coordinates[joint]]
+    for r in data.recordings:
+        q = r[data.plant.coordinates[joint]]
         step = max(1, min(round(0.05 * r.rate), len(q) - 1))
         speeds.append(np.abs((q[step:] - q[:-step]) / (r.t[step:] - r.t[:-step])).max())
     return float(max(speeds))

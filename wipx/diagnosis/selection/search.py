@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wipx.core.diagnosis import Candidate
-from wipx.diagnosis.candidates.screening import SCANS, Prospect, prospects, prospects_of_effect, undosed
+from wipx.core.diagnosis import ConsideredEffect
+from wipx.diagnosis.candidates.screening import SCANS, Candidate, candidates_beside, candidates_of_effect, unscaled
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.sandwich import inflation
-from wipx.diagnosis.selection.nested_laws import parted, simple_law, simple_values, simpler
+from wipx.diagnosis.selection.nested_laws import effects_in_parts, reduced_effects, reduced_law, reduced_values
 
 MOST_EFFECTS = 8
 LEAST_SHARE = 0.01  # of what is explained already
@@ -54,11 +54,11 @@ class Selection:
     setting: Setting
     nominal: Fit
     transfers: Callable[[Fit, Fit], bool] = taken_for_granted
-    considered: list[Candidate] = field(default_factory=list)
+    considered: list[ConsideredEffect] = field(default_factory=list)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
     _fleeting: set[frozenset[str]] = field(default_factory=set)  # what does not transfer
-    _prospects: dict[int, tuple[Fit, list[Prospect]]] = field(default_factory=dict)
+    _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
 
     def run(self) -> Fit:
         """The fit of the effects that are missing; `nominal` where none is."""
@@ -77,7 +77,7 @@ class Selection:
                     break
                 added = [effect for effect in best.effects if effect not in current.effects]
                 gain = self.evidence(current, best)
-                self.considered.append(Candidate(" + ".join(added), gain, True, "explain most together"))
+                self.considered.append(ConsideredEffect(" + ".join(added), gain, True, "explain most together"))
                 current = self.pruned(self.settled(best))
                 continue
             told = len(self.considered)
@@ -86,7 +86,7 @@ class Selection:
             if len(pruned.effects) == len(current.effects) and self.lead(pruned, current) < LEAST_LEAD:
                 del self.considered[told:]
                 reason = "hardly better in the place of one that is there"
-                self.considered.append(Candidate(best.effects[-1], self.evidence(current, best), False, reason))
+                self.considered.append(ConsideredEffect(best.effects[-1], self.evidence(current, best), False, reason))
                 break
             current = pruned
         return self.exchanged(current)
@@ -106,11 +106,13 @@ class Selection:
         own = sum(len(fit.hypothesis.parameters_of(effect)) for effect in fit.effects)
         return self.evidence(base, fit) - 0.5 * own * np.log(fit.rows)
 
-    def worthwhile(self, smaller: Fit, larger: Fit) -> bool:
+    def gains_enough(self, smaller: Fit, larger: Fit) -> bool:
         """Whether the effects that `larger` has beside those of `smaller` are worth it."""
-        return self.evidence(smaller, larger) >= self.needed(smaller, larger) and self.fitter.holds(smaller, larger)
+        return self.evidence(smaller, larger) >= self.required_gain(smaller, larger) and self.fitter.holds(
+            smaller, larger
+        )
 
-    def needed(self, smaller: Fit, larger: Fit) -> float:
+    def required_gain(self, smaller: Fit, larger: Fit) -> float:
         """Evidence that the effects which `larger` has beside those of `smaller` must gain [nats]."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
         indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
@@ -132,18 +134,18 @@ class Selection:
         Beyond a few effects it must also transfer to held-out recordings.
         """
         for found in extended:
-            worth = found if self.worthwhile(current, found) else self.plainer(found, found.effects[-1])
-            if worth is None or not self.worthwhile(current, worth):
+            worth = found if self.gains_enough(current, found) else self.with_reduced_law(found, found.effects[-1])
+            if worth is None or not self.gains_enough(current, worth):
                 continue
             if len(worth.effects) <= self.fitter.unproven or self.transfers(current, worth):
                 return worth
             self._fleeting.add(frozenset(worth.effects))
         return None
 
-    def plainer(self, fit: Fit, effect: str) -> Fit | None:
+    def with_reduced_law(self, fit: Fit, effect: str) -> Fit | None:
         """The fit with the simple law that an effect contains in its place; None where there is none or no room."""
         rest = tuple(e for e in fit.effects if e != effect)
-        simple = simple_law(effect, rest, fit.hypothesis.model.plant)
+        simple = reduced_law(effect, rest, fit.hypothesis.model.plant)
         return None if simple is None else self.fitted((*rest, simple), fit)
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
@@ -153,15 +155,15 @@ class Selection:
         for one in extended[:PAIRED]:
             if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
                 two = self.preferred(self.extensions(one), current)
-                if two is not None and self.worthwhile(current, two):
+                if two is not None and self.gains_enough(current, two):
                     return two
         return None
 
-    def prospects_of(self, fit: Fit) -> list[Prospect]:
+    def candidates_for(self, fit: Fit) -> list[Candidate]:
         """Where to start for every effect that could be added, the best first."""
-        if id(fit) not in self._prospects:
-            self._prospects[id(fit)] = (fit, prospects(self.fitter, self.setting, fit))
-        return self._prospects[id(fit)][1]
+        if id(fit) not in self._candidates:
+            self._candidates[id(fit)] = (fit, candidates_beside(self.fitter, self.setting, fit))
+        return self._candidates[id(fit)][1]
 
     def caught_up(self, fit: Fit, larger: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of a larger fit.
@@ -184,7 +186,7 @@ class Selection:
         likelihood of an effect has many peaks, the highest may be another one beside further effects.
         """
         found = [self.fitter.polished(self.fitter.fit(fit.hypothesis, self.fitter.loosened(fit)))]
-        moved = nonsmooth_search.explored(self.fitter, fit)
+        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         if moved is not fit:
             found.append(self.fitter.polished(moved))
         if len(fit.effects) > 1:
@@ -198,7 +200,7 @@ class Selection:
     def _begun_anew(self, fit: Fit, effect: str) -> Fit:
         """A fit of the same effects, for which one of them starts from where the others leave it room."""
         base = self.without(fit, effect)
-        starts = sorted(prospects_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
+        starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
         return self.fitter.polished(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
 
     def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
@@ -206,18 +208,18 @@ class Selection:
         if not fits:
             return None
         best = max(fits, key=lambda fit: self.score(fit, base))
-        replaced = simpler(best, self.fitter.log)
+        replaced = reduced_effects(best, self.fitter.data)
         while replaced is not None:
             found = self.fitted(replaced, best)
             if self.score(found, base) < self.score(best, base) - self._tolerance(best, replaced):
                 break
             best = found
-            replaced = simpler(best, self.fitter.log)
+            replaced = reduced_effects(best, self.fitter.data)
         for effect in best.effects:
-            plain = self.plainer(best, effect)
+            plain = self.with_reduced_law(best, effect)
             if plain is not None and self.score(best, base) - self.score(plain, base) < self.fitter.richer_by:
                 return plain
-        parts = parted(best, self.fitter.log)
+        parts = effects_in_parts(best, self.fitter.data)
         if parts is not None:
             found = self.settled(self.fitted(parts, best))
             best = found if self.score(found, base) > self.score(best, base) else best
@@ -227,7 +229,7 @@ class Selection:
         """The fit of some effects, from the values and noise of another fit on."""
         key = frozenset(effects)
         if key not in self._fits:
-            values = {**simple_values(start), **start.hypothesis.values}
+            values = {**reduced_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
             self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
         return self._fits[key]
@@ -237,18 +239,18 @@ class Selection:
         for effect in fit.effects if len(fit.effects) > 1 else ():
             rest = tuple(e for e in fit.effects if e != effect)
             smaller = self.fitted(rest, fit)
-            if self.evidence(smaller, fit) < DOUBTED * self.needed(smaller, fit):
-                smaller = self._explored(smaller)
-            if not self.worthwhile(smaller, fit):
+            if self.evidence(smaller, fit) < DOUBTED * self.required_gain(smaller, fit):
+                smaller = self._searched_by_trial(smaller)
+            if not self.gains_enough(smaller, fit):
                 self.considered.append(
-                    Candidate(effect, self.evidence(smaller, fit), False, "superfluous beside the others")
+                    ConsideredEffect(effect, self.evidence(smaller, fit), False, "superfluous beside the others")
                 )
                 return self.pruned(smaller) if len(rest) > 1 else smaller
         return fit
 
-    def _explored(self, fit: Fit) -> Fit:
+    def _searched_by_trial(self, fit: Fit) -> Fit:
         """A fit, or a better one of the same effects that a search by trial leads to."""
-        moved = nonsmooth_search.explored(self.fitter, fit)
+        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         if moved is not fit:
             moved = self._fits[frozenset(fit.effects)] = self.fitter.polished(moved)
         return moved
@@ -260,7 +262,7 @@ class Selection:
             for effect in fit.effects:
                 base = self.without(fit, effect)
                 found = self.preferred(self.extensions(base), base)
-                if found is not None and self.lead(found, fit) > most and self.worthwhile(base, found):
+                if found is not None and self.lead(found, fit) > most and self.gains_enough(base, found):
                     best, most = found, self.lead(found, fit)
             if best is fit:
                 best = self._with_fewer(fit)
@@ -305,10 +307,10 @@ class Selection:
         return max(4.0, (STICKING_SHARE if rests else LEAST_SHARE) * self.evidence(self.nominal, best))
 
     def _extended(self, fit: Fit) -> list[Fit]:
-        ranked = self.prospects_of(fit)
-        by_effect: dict[str, list[Prospect]] = {}
-        for prospect in ranked:
-            by_effect.setdefault(prospect.effect, []).append(prospect)
+        ranked = self.candidates_for(fit)
+        by_effect: dict[str, list[Candidate]] = {}
+        for candidate in ranked:
+            by_effect.setdefault(candidate.effect, []).append(candidate)
         best = max((ranked[0].gain if ranked else 0.0), 0.0)
         least = max(self.fitter.promising * best, self.fitter.worthless)
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
@@ -324,9 +326,9 @@ class Selection:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -self.score(f, fit))
 
-    def _best_start(self, fit: Fit, starts: list[Prospect]) -> Fit:
+    def _best_start(self, fit: Fit, starts: list[Candidate]) -> Fit:
         effects = (*fit.effects, starts[0].effect)
-        own = [start.values for start in starts] + undosed(self.setting, starts[0].effect)
+        own = [start.values for start in starts] + unscaled(self.setting, starts[0].effect)
         values = [{**others, **start} for others in nonsmooth_search.beside(fit, starts[0].effect) for start in own]
         begins = [Hypothesis.of(self.setting, effects, each) for each in values]
         levels = self.fitter.spread_for(begins[0].model, fit.levels)
@@ -338,8 +340,8 @@ class Selection:
             count = nonsmooth_search.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)
         fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
-        if starts[0].effect.partition("/")[2] in nonsmooth_search.ROUGH:
-            fits = [nonsmooth_search.explored(self.fitter, found) for found in fits]
+        if starts[0].effect.partition("/")[2] in nonsmooth_search.NON_SMOOTH:
+            fits = [nonsmooth_search.searched_by_trial(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)
 
     def _remember(self, current: Fit, extended: list[Fit], chosen: Fit | None) -> None:
@@ -351,7 +353,7 @@ class Selection:
             taken = chosen is not None and found.effects == chosen.effects
             fleeting = frozenset(found.effects) in self._fleeting
             reason = "predicts held-out recordings worse" if fleeting else _reason(best, gain, taken=taken)
-            self.considered.append(Candidate(_added(current, found), gain, taken, reason))
+            self.considered.append(ConsideredEffect(_added(current, found), gain, taken, reason))
 
 
 def _added(current: Fit, larger: Fit) -> str:
