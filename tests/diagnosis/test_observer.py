@@ -240,6 +240,6 @@ def test_full_gains_put_the_state_on_the_recording():
 
 def test_a_recording_that_is_left_out_does_not_count():
     case = bench("linear_axis", {}, seed=2, duration=1.0)
-    without = replace(case.data, left_out=1)
+    without = replace(case.data, left_out=(1,))
     assert without.counted[:, 0].any()
     assert not without.counted[:, 1].any()

@@ -1,4 +1,4 @@
-"""Does the answer transfer: every recording judged by a model that was fitted to the others."""
+"""Does the answer transfer: every recording judged by a model that was fitted to others."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,15 @@ from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.identify.evaluation import Judge
 
 STEPS = 3  # of refining values that are nearly right
+FOLDS = 8  # at most; more recordings are left out in turn by several at once
 
 
 @dataclass(frozen=True)
 class Transfer:
-    """A fit repeated without each recording in turn.
+    """A fit repeated without each fold of recordings in turn.
 
     Attributes:
-        models: Completed model of each fold, one per recording.
+        models: Completed model of each recording's fold, one per recording.
         likelihoods: Log-likelihood of each recording under its fold's model, shape (R,).
     """
 
@@ -27,11 +28,13 @@ class Transfer:
 
 
 def transfer(fitter: Fitter, fit: Fit) -> Transfer:
-    """Leave out each recording; one alone is judged by the model that was fitted to it."""
+    """Leave out each recording, or folds of them; one alone is judged by the model that was fitted to it."""
     count = len(fitter.data.recordings)
     cubes = [fit.hypothesis.cube] * count
     if count > 1 and len(fit.hypothesis.cube):
-        cubes = [fitter.without(r).fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube for r in range(count)]
+        folds = [range(k, count, FOLDS) for k in range(min(FOLDS, count))]
+        found = [fitter.without(*fold).fit(fit.hypothesis, fit.levels, steps=STEPS).hypothesis.cube for fold in folds]
+        cubes = [found[r % FOLDS] for r in range(count)]
     space = fit.hypothesis.space
     batch = space.batch(np.stack(cubes))
     white = fitter.white_of(fit, batch).reshape(count, *fit.white.shape)

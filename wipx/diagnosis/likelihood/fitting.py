@@ -200,8 +200,8 @@ class Fitter(ABC):
         """The same with half the step of the simulator."""
 
     @abstractmethod
-    def without(self, recording: int) -> Self:
-        """The same with a recording that does not count."""
+    def without(self, *recordings: int) -> Self:
+        """The same with recordings that do not count."""
 
     @abstractmethod
     def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":

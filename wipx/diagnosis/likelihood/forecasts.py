@@ -177,7 +177,7 @@ class ForecastFitter(Fitter):
         last = windows.inputs.t[windows.inputs.last, np.arange(windows.count)]
         interval = max(float(np.median(np.diff(recording.t))) for recording in self._recordings)
         whole = last >= windows.starts + HORIZON - 1.5 * interval - 1e-6
-        return whole & (windows.recording != (-1 if self.data.left_out is None else self.data.left_out))
+        return whole & ~np.isin(windows.recording, self.data.left_out)
 
     @property
     def is_possible(self) -> bool:
@@ -188,9 +188,9 @@ class ForecastFitter(Fitter):
         """The same with half the step of the simulator."""
         return replace(self, by_row=self.by_row.refined(), _doubts={}, _seen={})
 
-    def without(self, recording: int) -> "ForecastFitter":
-        """The same with a recording that does not count."""
-        return replace(self, by_row=self.by_row.without(recording), _doubts={}, _seen={})
+    def without(self, *recordings: int) -> "ForecastFitter":
+        """The same with recordings that do not count."""
+        return replace(self, by_row=self.by_row.without(*recordings), _doubts={}, _seen={})
 
     def begun(self, hypothesis: Hypothesis) -> Fit:
         """A first fit of a hypothesis, from starts of its own."""

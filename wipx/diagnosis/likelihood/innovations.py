@@ -80,9 +80,9 @@ class InnovationFitter(Fitter):
             replace(self.innovations_model, simulator=replace(self.simulator, step=0.5 * self.simulator.step))
         )
 
-    def without(self, recording: int) -> "InnovationFitter":
-        """The same with a recording that does not count."""
-        return InnovationFitter(replace(self.innovations_model, data=replace(self.data, left_out=recording)))
+    def without(self, *recordings: int) -> "InnovationFitter":
+        """The same with recordings that do not count."""
+        return InnovationFitter(replace(self.innovations_model, data=replace(self.data, left_out=recordings)))
 
     def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""

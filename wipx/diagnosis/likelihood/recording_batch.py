@@ -26,7 +26,7 @@ class RecordingBatch:
         channels: Which of these are recorded, indices (c,); coordinates always.
         reported: Forces that the drives report, shape (K + 1, i, R) [N or N m]; i is the number of commands, or zero
             where they do not, only repeat the command, or the log has mean commands.
-        left_out: A recording whose rows do not count; None for none.
+        left_out: Recordings whose rows do not count.
     """
 
     plant: Plant
@@ -35,7 +35,7 @@ class RecordingBatch:
     measured: np.ndarray
     channels: np.ndarray
     reported: np.ndarray
-    left_out: int | None = None
+    left_out: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, recordings: tuple[Recording, ...], plant: Plant) -> "RecordingBatch":
@@ -76,7 +76,7 @@ class RecordingBatch:
     def counted(self) -> np.ndarray:
         """Rows that count, shape (K + 1, R): not those in which the state is still settling."""
         settled = self.rows & (self.inputs.t >= self.inputs.t[0] + SETTLES)
-        return settled & (np.arange(self.inputs.windows) != self.left_out)
+        return settled & ~np.isin(np.arange(self.inputs.windows), self.left_out)
 
     @cached_property
     def intervals(self) -> np.ndarray:
