@@ -1,6 +1,6 @@
 """Which evidence names missing physics where no law holds exactly: criteria compared on the same recordings.
 
-    python -m wipx.concealed.dirty --cases 24 --seed 7 --lengths 5 9 --out runs/dirty_dev
+    python -m wipx.proof.blind_robots.dirty --cases 24 --seed 7 --lengths 5 9 --out runs/dirty_dev
     python benchmarks/criteria.py --rigs --drawn runs/dirty_dev --out runs/criteria
 
 Every criterion drives the same search. The numbers of what it names are then fitted in the same way, so that only the
@@ -20,7 +20,6 @@ from hydra import compose, initialize_config_dir
 from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
-from wipx.concealed.dirty_score import alike
 from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
@@ -33,6 +32,7 @@ from wipx.diagnosis.selection.search import Selection
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
+from wipx.proof.blind_robots.dirty_score import alike
 from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -116,7 +116,7 @@ CRITERIA: Mapping[str, Callable[[Context], Fitter]] = {
 
 
 def drawn(folder: Path) -> Iterator[Case]:
-    """Robots that `wipx.concealed.dirty` has drawn."""
+    """Robots that `wipx.proof.blind_robots.dirty` has drawn."""
     for place in sorted(folder.glob("case*")):
         truth = json.loads((place / "answer.json").read_text(encoding="utf-8"))
         source = RecordingSource(path=str(place / "visible"))
@@ -135,7 +135,7 @@ def rigs() -> Iterator[Case]:
     task: Any = OmegaConf.to_container(composed, resolve=True)
     for name, settings in task["cases"].items():
         case = instantiate(
-            {"_target_": "wipx.tasks.real_recordings.Case", **settings}, _recursive_=False, _convert_="all"
+            {"_target_": "wipx.proof.real_machines.recordings.Case", **settings}, _recursive_=False, _convert_="all"
         )
         source = case.of(instantiate(task["sources"][settings["dataset"]], _convert_="all"))
         published = instantiate(settings["published"], _convert_="all")
@@ -232,7 +232,7 @@ def main() -> None:
     """Compare, robot by robot."""
     parser = argparse.ArgumentParser(description="Compare criteria on the same recordings.")
     parser.add_argument("--rigs", action="store_true", help="the rigs of +experiment=real_recordings")
-    parser.add_argument("--drawn", type=Path, nargs="*", default=[], help="folders of `wipx.concealed.dirty`")
+    parser.add_argument("--drawn", type=Path, nargs="*", default=[], help="folders of `wipx.proof.blind_robots.dirty`")
     parser.add_argument("--only", nargs="*", default=[], help="names of rigs; all without it")
     parser.add_argument("--out", type=Path, required=True, help="folder that takes the results")
     arguments = parser.parse_args()

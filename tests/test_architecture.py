@@ -11,11 +11,12 @@ LAYERS = (
     {"core"},
     {"effects"},
     {"sim"},
-    {"concealed", "control", "identify", "recordings", "report", "tracking"},
+    {"control", "identify", "recordings", "report", "tracking"},
     {"hardware", "learn"},
-    {"diagnosis", "rivals"},
+    {"baselines", "diagnosis"},
     {"library"},
     {"tasks"},
+    {"proof"},
     {"config"},
     {"app"},
     {"__main__"},
@@ -35,14 +36,14 @@ ALLOWED_IN = {
     "hydra": {"config", "app", "__main__"},
     "omegaconf": {"config", "app", "__main__"},
     "pybullet": {"sim"},
-    "mujoco": {"sim", "rivals"},
-    "torch": {"learn", "rivals"},
+    "mujoco": {"sim", "baselines"},
+    "torch": {"learn", "baselines"},
     "lightning": {"learn"},
     "onnx": {"learn"},
     "onnxruntime": {"learn"},
     "osqp": {"control"},
-    "pysindy": {"rivals"},
-    "cma": {"identify", "rivals"},
+    "pysindy": {"baselines"},
+    "cma": {"identify", "baselines"},
     "pymoo": {"identify"},
     "can": {"hardware"},
     "cantools": {"hardware"},
@@ -69,6 +70,14 @@ def test_imports_point_one_way(path: Path):
         if package == "wipx" and inner[0] != room:
             assert RANK[inner[0]] < RANK[room], f"{room} must not import {name}"
             assert room != "report" or inner[0] == "core", f"report reads finished results only, not {name}"
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "proof" / "blind_robots").glob("*.py")), ids=lambda path: path.stem)
+def test_blind_robots_share_no_physics_with_what_is_fitted(path: Path):
+    for name in _imports(path):
+        package, *inner = name.split(".")
+        own = inner[:2] == ["proof", "blind_robots"]
+        assert package != "wipx" or own or inner[0] == "core", f"{path.stem} must not import {name}"
 
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "diagnosis").rglob("*.py")), ids=lambda path: path.stem)

@@ -18,7 +18,7 @@ import numba
 from numba.core import config as numba_settings
 
 PACKAGE = Path(__file__).resolve().parent.parent
-UNSEEN = "concealed"  # folder whose code is its own, and which nothing else may open
+UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
 COMPILED = ("cached", "law", "inlined")  # decorators
 
 

@@ -81,8 +81,8 @@ class Predict:
 
     def _learned(self, model: Model, noise: np.ndarray) -> Simulator:
         """The simulator with the learned acceleration."""
-        from wipx.rivals.learned_simulator import learned_simulator
-        from wipx.rivals.network import read_network
+        from wipx.baselines.learned_simulator import learned_simulator
+        from wipx.baselines.network import read_network
 
         assert self.residual is not None
         joints = len(model.plant.joints)

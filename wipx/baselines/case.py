@@ -1,0 +1,116 @@
+"""What a rival is given and what it answers: the same for all of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from wipx.baselines.network import ResidualAcceleration
+from wipx.core.model import Model
+from wipx.core.parameters import Scales
+from wipx.core.plant import Plant
+from wipx.core.recording import Recording
+from wipx.effects.catalogue import effect_of, vocabulary
+from wipx.identify.noise import sensor_noise
+from wipx.identify.parameter_space import scales_of
+from wipx.sim.analytic import AnalyticSimulator
+
+
+@dataclass(frozen=True)
+class Case:
+    """Recordings of a robot, and what its owner believes of it.
+
+    Attributes:
+        recordings: All that may be used.
+        nominal: The owner's model.
+        uncertainty: Relative standard deviation of nominal numbers that are not exact.
+        simulator: The engine.
+    """
+
+    recordings: tuple[Recording, ...]
+    nominal: Model
+    uncertainty: Mapping[str, float]
+    simulator: AnalyticSimulator
+
+    @cached_property
+    def noise(self) -> np.ndarray:
+        """Sensor noise of each coordinate, shape (joints,) [m or rad]."""
+        return sensor_noise(self.recordings, self.nominal.plant)
+
+    @cached_property
+    def scales(self) -> dict[str, Scales]:
+        """Characteristic sizes by site."""
+        return scales_of(self.nominal, self.recordings)
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """What each joint reaches, shape (joints,) [m/s or rad/s]."""
+        return tuple(self.scales[site].velocity for site in self.nominal.plant.joints)
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Effects of contract section 3 that can be added to the owner's model."""
+        plant, present = self.nominal.plant, tuple(self.nominal.effects)
+        contract = (
+            name for name, effect in vocabulary(plant).items() if not effect.outside_vocabulary and name not in present
+        )
+        return tuple(name for name in contract if not excluded(name, present, plant))
+
+
+def excluded(name: str, present: tuple[str, ...], plant: Plant) -> bool:
+    """Whether an effect cannot act beside those that are present."""
+    site, _, kind = name.partition("/")
+    beside = [other.partition("/")[2] for other in present if other.partition("/")[0] == site]
+    refused = effect_of(name, plant).excludes
+    return any(other in refused or kind in effect_of(f"{site}/{other}", plant).excludes for other in beside)
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that a rival names.
+
+    Attributes:
+        name: "site/kind".
+        parameters: Its numbers by symbol [SI].
+        weight: How much worse the fit is without it; shares are in proportion to it.
+        equivalent: Effects that explain the recordings exactly as well.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    weight: float
+    equivalent: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a rival says.
+
+    Attributes:
+        model: The completed model.
+        found: Effects that it names.
+        mismatch: Whether it says that the nominal model is wrong.
+        network: Acceleration that is added to the model; None for a rival that needs no network.
+        notes: What a reader must know, one sentence each.
+    """
+
+    model: Model
+    found: tuple[Found, ...]
+    mismatch: bool
+    network: ResidualAcceleration | None = None
+    notes: tuple[str, ...] = ()
+
+
+class Rival(Protocol):
+    """A method that people would use in place of a diagnosis."""
+
+    @property
+    def seconds(self) -> float:
+        """Its budget of time [s]."""
+        ...
+
+    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+        """Complete the model of a case within the budget, and name what was missing."""
+        ...

@@ -1,0 +1,1 @@
+"""Recordings of real machines, diagnosed and compared with what their authors published."""

@@ -1,0 +1,136 @@
+"""`task=rival`: what people would use in place of a diagnosis, on the same recordings and judged by the same score."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.baselines.case import Answer, Case, Found, Rival
+from wipx.baselines.learned_simulator import learned_simulator
+from wipx.core.effect import Effect
+from wipx.core.plant import Plant
+from wipx.core.results import FitErrors
+from wipx.effects.catalogue import effect_of
+from wipx.identify.evaluation import Judge
+from wipx.identify.windows import check_long_enough
+from wipx.recordings.model_file import write_model
+from wipx.recordings.source import RecordingSource
+from wipx.tasks.job import Job
+from wipx.tasks.results import flat, write_json, written_together
+
+HORIZON = 0.5  # [s], contract section 4
+NETWORK = "residual.npz"
+
+
+@dataclass(frozen=True)
+class RunRival:
+    """Ask a rival about the recordings of a source."""
+
+    def run(self, job: Job) -> None:
+        """Write diagnosis.json, model.yaml and, of a rival that learned one, the network."""
+        source: RecordingSource = job.part("recordings")
+        description = source.describe()
+        nominal = job.part("plant").nominal(description.model)
+        recordings = source.load()
+        check_long_enough(recordings)
+        case = Case(recordings, nominal, description.uncertainty, job.part("sim"))
+        rival: Rival = job.part("rival")
+        begun = time.perf_counter()
+        answer = rival.answer(case, np.random.default_rng(job.seed))
+        seconds = time.perf_counter() - begun
+        errors = _errors(case, answer)
+        content = diagnosis(answer, errors, case) | {"source": str(source.path), "seconds": seconds}
+        (job.out / NETWORK).unlink(missing_ok=True)  # of an earlier run
+        with written_together(job.out) as folder:
+            write_json(folder / "diagnosis.json", content)
+            write_model(answer.model, folder / "model.yaml")
+            if answer.network is not None:
+                answer.network.write(folder / NETWORK)
+        _track(job, source.name, answer, errors, seconds)
+        named = ", ".join(found.name for found in answer.found) or "nothing by name"
+        print(f"{content['verdict']}: {named}; {seconds:.1f} s; written to {job.out}")
+
+
+def _errors(case: Case, answer: Answer) -> FitErrors:
+    """Prediction errors on the recordings that were fitted."""
+    judge = Judge(case.simulator, case.noise, HORIZON)
+    errors, _ = judge.compare(case.nominal, answer.model, case.recordings, held_out=False)
+    if answer.network is None:
+        return errors
+    learned = Judge(learned_simulator(answer.network, case.noise), case.noise, HORIZON)
+    black_box, _ = learned.compare(answer.model, answer.model, case.recordings, held_out=False)
+    return FitErrors(errors.horizon, errors.windows, errors.nominal, black_box.completed, black_box.noise_floor)
+
+
+def diagnosis(answer: Answer, errors: FitErrors, case: Case) -> dict[str, object]:
+    """What a rival can fill of diagnosis.json, contract section 5; it has no intervals and no probabilities."""
+    plant = case.nominal.plant
+    total = sum(found.weight for found in answer.found) or 1.0
+    sites: dict[str, float] = {}
+    for found in answer.found:
+        site = found.name.partition("/")[0]
+        sites[site] = sites.get(site, 0.0) + found.weight / total
+    return {
+        "schema": 1,
+        "verdict": "mismatch" if answer.mismatch else "consistent",
+        "effects": [
+            _effect(found, effect_of(found.name, plant), plant, found.weight / total) for found in answer.found
+        ],
+        "location": {"sites": sites, "regions": _regions(answer), "times": _times(answer, case)},
+        "fit": {
+            "horizon_s": errors.horizon,
+            "train": {
+                "nominal": dict(errors.nominal),
+                "completed": dict(errors.completed),
+                "noise_floor": dict(errors.noise_floor),
+            },
+        },
+        "unexplained": {"significant": False, "p_value": None, "site": None},
+        "identifiability": {"weak": [], "next_experiment": None},
+        "notes": list(answer.notes),
+    }
+
+
+def _regions(answer: Answer) -> list[dict[str, object]]:
+    """Where a sticky spot is; other effects act everywhere."""
+    spots = [found.parameters for found in answer.found if found.name.endswith("/sticky_spot")]
+    return [{"signal": "x", "low": spot["lo"], "high": spot["hi"], "share": 1.0} for spot in spots]
+
+
+def _times(answer: Answer, case: Case) -> list[dict[str, object]]:
+    """From when on a payload is there, in each recording."""
+    events = [found.parameters["t0"] for found in answer.found if found.name.endswith("/payload_event")]
+    return [
+        {"low": t0, "high": float(recording.t[-1]), "share": 1.0, "recording": recording.name}
+        for t0 in events
+        for recording in case.recordings
+        if t0 < recording.t[-1]
+    ]
+
+
+def _effect(found: Found, effect: Effect, plant: Plant, share: float) -> Mapping[str, object]:
+    angular = plant.is_angular(found.name.partition("/")[0])
+    units = {p.name: p.unit(angular=angular) for p in effect.parameters}
+    return {
+        "name": found.name,
+        "parameters": {
+            symbol: {"value": value, "ci95": [None, None], "unit": units[symbol]}
+            for symbol, value in found.parameters.items()
+        },
+        "equivalent": list(found.equivalent),
+        "share": share,
+    }
+
+
+def _track(job: Job, title: str, answer: Answer, errors: FitErrors, seconds: float) -> None:
+    figures = {
+        f"fit/{model}/{column}": value
+        for model in ("nominal", "completed", "noise_floor")
+        for column, value in getattr(errors, model).items()
+    }
+    figures |= {f"parameter/{f.name}.{symbol}": v for f in answer.found for symbol, v in f.parameters.items()}
+    figures["seconds"] = seconds
+    names = ["diagnosis.json", "model.yaml", *([NETWORK] if answer.network is not None else [])]
+    tags = {"plant": answer.model.plant.kind, "verdict": "mismatch" if answer.mismatch else "consistent"}
+    job.part("tracking").log(title, flat(job.settings), figures, {}, [job.out / name for name in names], tags)
