@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-slow test-bounds check bench lock clean
+.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -75,6 +75,9 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 test: $(READY)  ## run the tests (without the slow ones)
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow"
+
+test-fresh: $(READY)  ## run the tests with random numbers that no run had (SEED=N: those of an earlier one)
+	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow" --seed=$(or $(SEED),fresh)
 
 test-slow: $(READY)  ## run the slow tests
 	$(PY) -m pytest -q -m slow

@@ -1,16 +1,43 @@
-"""Fixtures that every test may use."""
+"""Fixtures that every test may use, and the seed of what tests draw at random.
 
+A run draws the same numbers as the one before. `pytest --seed=N` draws others, `--seed=fresh` those that no run had; a
+failed test says with which command it fails again.
+"""
+
+import hashlib
 import os
 import secrets
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
+FRESH = "fresh"
 
-settings.register_profile("wipx", deadline=None)  # the first call of a compiled law takes seconds
-settings.load_profile("wipx")
+# The first call of a compiled law takes seconds.
+settings.register_profile("fixed", deadline=None, derandomize=True)
+settings.register_profile(FRESH, deadline=None)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--seed", default="0", help=f"of what tests draw at random: a number, or {FRESH}")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("fixed" if config.option.seed == "0" else FRESH)
+    if config.option.seed == FRESH:  # the processes of a run take the number over
+        config.option.seed = str(secrets.randbits(32))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    if report.failed:
+        seed = item.config.option.seed
+        report.sections.append(("fails again with", f"python -m pytest '{item.nodeid}' --seed={seed}"))
+    return report
 
 
 def _data(variable: str, name: str) -> Path:
@@ -33,8 +60,7 @@ def recordings_root() -> Path:
 
 
 @pytest.fixture
-def fresh_seed() -> int:
-    """A seed that no earlier test run had; printed, so that a failure can be repeated."""
-    seed = secrets.randbits(32)
-    print(f"seed {seed}")
-    return seed
+def fresh_seed(request: pytest.FixtureRequest) -> int:
+    """A seed of the test's own; another one with every `--seed`."""
+    drawn = f"{request.config.option.seed} {request.node.nodeid}"
+    return int.from_bytes(hashlib.sha256(drawn.encode()).digest()[:4], "big")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from wipx.app import main
 from wipx.core.errors import InputError
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

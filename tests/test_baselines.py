@@ -26,7 +26,7 @@ from wipx.core.recording import Recording
 from wipx.identify.evaluation import Judge
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
-from wipx.tasks.results import write_csv
+from wipx.tasks.files.results import write_csv
 
 SIMULATOR = AnalyticSimulator(threads=1)
 BODY = {"body_mass": 0.8, "com_height": 0.45, "body_inertia": 0.037}

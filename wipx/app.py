@@ -23,8 +23,8 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
-from wipx.tasks.finished import ERROR, SETTINGS
-from wipx.tasks.job import Job
+from wipx.tasks.files.finished import ERROR, SETTINGS
+from wipx.tasks.shared.job import Job
 
 ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
 DONE, DEFECT, INPUT_AT_FAULT, INTERRUPTED = 0, 1, 2, 130

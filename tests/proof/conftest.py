@@ -1,5 +1,5 @@
 """The program as a user calls it, for the proofs."""
 
-from tasks.conftest import program
+from tasks.conftest import folder, program
 
-__all__ = ["program"]
+__all__ = ["folder", "program"]

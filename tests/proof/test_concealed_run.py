@@ -19,7 +19,7 @@ from wipx.proof.blind.diagnosing import OURS, Diagnosers, check_methods
 from wipx.proof.blind_robots.folder import RunFolder
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 CONSISTENT = {
     "schema": 1,

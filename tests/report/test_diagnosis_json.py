@@ -7,7 +7,7 @@ from report import synthetic_diagnosis
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.report.diagnosis_json import diagnosis_json
-from wipx.tasks.results import write_json
+from wipx.tasks.files.results import write_json
 
 CONTRACT = {
     "": {"schema", "verdict", "effects", "location", "fit", "unexplained", "identifiability"},

@@ -56,9 +56,9 @@ def test_compiled_functions_and_all_they_use_ask_for_compilation(tmp_path: Path,
         ("core/law.py", True),
         ("effects/dead_zone.py", True),
         ("identify/kalman.py", True),
-        ("diagnosis/response.py", True),
-        ("diagnosis/leftover.py", True),
-        ("diagnosis/log.py", True),  # a constant of it is compiled into the observer
+        ("diagnosis/likelihood/force_response.py", True),
+        ("diagnosis/residuals/residual_tests.py", True),
+        ("diagnosis/likelihood/recording_batch.py", True),  # a constant of it is compiled into the observer
         ("report/page.py", False),
         ("tasks/diagnose.py", False),
     ],

@@ -60,7 +60,7 @@ def test_a_robot_emulated_by_another_simulator_is_recorded_anew(
     program: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     for simulator in ("before", "before", "after"):
-        monkeypatch.setattr("wipx.tasks.trials.simulator_digest", lambda simulator=simulator: simulator)
+        monkeypatch.setattr("wipx.tasks.shared.trials.simulator_digest", lambda simulator=simulator: simulator)
         run = program("task=adapt", "method=pure_sim", *ROBOT, f"hydra.run.dir={simulator}")
         assert run.status == 0, run.error
     assert len([folder for folder in (tmp_path / "runs" / "trials").iterdir() if folder.is_dir()]) == 2

@@ -19,11 +19,11 @@ from wipx.core.recording import Recording
 from wipx.hardware.push import pushed
 from wipx.hardware.target import LoadChange, Push, Trial
 from wipx.hardware.testbed import EmulatedTestbed
-from wipx.tasks.control_files import plain_control, read_control, write_courses
-from wipx.tasks.control_metrics import Judge, settled
-from wipx.tasks.control_scenarios import SCENARIOS
-from wipx.tasks.control_table import by_scenario
-from wipx.tasks.results import write_json
+from wipx.tasks.files.control import plain_control, read_control, write_courses
+from wipx.tasks.files.results import write_json
+from wipx.tasks.shared.control_metrics import Judge, settled
+from wipx.tasks.shared.control_scenarios import SCENARIOS
+from wipx.tasks.tables.control import by_scenario
 
 
 @pytest.fixture(scope="module")

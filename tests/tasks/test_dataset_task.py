@@ -23,7 +23,7 @@ from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import StateFeedback
 from wipx.tasks.dataset import DECIDING, FOLDER, Dataset, training_set_of
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 ROBOT = {
     "plant": "wip",

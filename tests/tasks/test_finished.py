@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from wipx.core.errors import InputError
-from wipx.tasks.finished import ERROR, finish, finished, finished_jobs
-from wipx.tasks.job import Job
+from wipx.tasks.files.finished import ERROR, finish, finished, finished_jobs
+from wipx.tasks.shared.job import Job
 
 SETTINGS: dict[str, Any] = {"name": "a", "seed": 1, "optimizer": {"particles": 50, "bounds": [0, 1]}, "tracking": None}
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from wipx.core.errors import InputError
-from wipx.tasks.stages import Chain, Stage
+from wipx.tasks.shared.stages import Chain, Stage
 
 
 def figure(name: str = "figure", *more: str) -> Stage:

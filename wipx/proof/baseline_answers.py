@@ -11,7 +11,7 @@ from wipx.baselines.case import Case, Rival
 from wipx.core.errors import InputError, unknown_name
 from wipx.proof.unseen import Unseen
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

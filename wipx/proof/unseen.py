@@ -10,7 +10,7 @@ from wipx.diagnosis.decision.context import HORIZON
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from wipx.identify.adaptation import AdaptationProblem, Adapted
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
-from wipx.tasks.adaptation_files import plain_adaptation, write_trajectories
-from wipx.tasks.adapted import adaptation_problem, adapted_simulation, loaded_trials
-from wipx.tasks.finished import finish, finished
-from wipx.tasks.job import Job
-from wipx.tasks.results import flat, written_together
-from wipx.tasks.trials import TrialPlan, trials_of
+from wipx.tasks.files.adaptation import plain_adaptation, write_trajectories
+from wipx.tasks.files.finished import finish, finished
+from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.shared.adapted import adaptation_problem, adapted_simulation, loaded_trials
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.trials import TrialPlan, trials_of
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.windows import check_long_enough
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.job import Job
-from wipx.tasks.results import flat, write_json, written_together
+from wipx.tasks.files.results import flat, write_json, written_together
+from wipx.tasks.shared.job import Job
 
 HORIZON = 0.5  # [s], contract section 4
 NETWORK = "residual.npz"

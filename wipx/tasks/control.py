@@ -19,14 +19,14 @@ from wipx.hardware.testbed import EmulatedTestbed
 from wipx.learn.estimator import Recipe, Workshop
 from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
-from wipx.tasks.control_files import plain_control, write_courses
-from wipx.tasks.control_metrics import Judge
-from wipx.tasks.control_scenarios import SCENARIOS, Scenario, ScenarioName
 from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
-from wipx.tasks.finished import finish, finished
-from wipx.tasks.job import Job
-from wipx.tasks.progress import StageProgress
-from wipx.tasks.results import flat, written_together
+from wipx.tasks.files.control import plain_control, write_courses
+from wipx.tasks.files.finished import finish, finished
+from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.shared.control_metrics import Judge
+from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioName
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import StageProgress
 
 Design = Controller | EquilibriumLqr
 WITHIN = 0.95  # share of the rail in which a predictive controller, which knows where it ends, plans to stay

@@ -21,12 +21,12 @@ from wipx.recordings.model_file import model_from_mapping, read_model
 from wipx.report.numbers import significant
 from wipx.sim.cache import simulator_digest
 from wipx.sim.simulator import StateFeedback
-from wipx.tasks.adapted import adaptation_problem, adapted_simulation, loaded_trials
-from wipx.tasks.finished import finish, finished
-from wipx.tasks.job import Job
-from wipx.tasks.locked import locked
-from wipx.tasks.results import flat, written_together
-from wipx.tasks.trials import TrialPlan, trials_of
+from wipx.tasks.files.finished import finish, finished
+from wipx.tasks.files.locked import locked
+from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.shared.adapted import adaptation_problem, adapted_simulation, loaded_trials
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.trials import TrialPlan, trials_of
 
 FOLDER = Path("runs/datasets")
 DECIDING = ("method", "friction", "sim", "objective", "optimizer", "plant", "effects", "bounds")  # beside the trials

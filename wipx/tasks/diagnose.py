@@ -14,9 +14,9 @@ from wipx.recordings.source import RecordingSource
 from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
 from wipx.sim.analytic import AnalyticSimulator
-from wipx.tasks.job import Job
-from wipx.tasks.progress import StageProgress
-from wipx.tasks.results import flat, write_csv, write_json, written_together
+from wipx.tasks.files.results import flat, write_csv, write_json, written_together
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import StageProgress
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from wipx.recordings.model_file import read_model, write_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
 from wipx.report.tables import summary
-from wipx.tasks.job import Job
-from wipx.tasks.progress import SearchProgress
-from wipx.tasks.results import flat, write_csv, write_json, written_together
+from wipx.tasks.files.results import flat, write_csv, write_json, written_together
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import SearchProgress
 
 
 @dataclass(frozen=True)

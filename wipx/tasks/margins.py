@@ -20,10 +20,10 @@ from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
 from wipx.tasks.control import Control, Design
 from wipx.tasks.dataset import Dataset, training_set_of
-from wipx.tasks.finished import finish, finished
-from wipx.tasks.job import Job
-from wipx.tasks.progress import StageProgress
-from wipx.tasks.results import flat, written_together
+from wipx.tasks.files.finished import finish, finished
+from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import StageProgress
 
 
 @dataclass(frozen=True)

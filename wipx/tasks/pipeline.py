@@ -15,13 +15,13 @@ from wipx.core.recording import Recording
 from wipx.hardware.excitations import KINDS, excitation
 from wipx.hardware.target import Target, Trial
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.control_scenarios import ScenarioName
-from wipx.tasks.job import Job
-from wipx.tasks.progress import StageProgress
-from wipx.tasks.results import write_csv, written_together
-from wipx.tasks.stages import Chain, Stage, claim
-from wipx.tasks.story import leave_story
-from wipx.tasks.trials import write_robot
+from wipx.tasks.files.results import write_csv, written_together
+from wipx.tasks.shared.control_scenarios import ScenarioName
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import StageProgress
+from wipx.tasks.shared.stages import Chain, Stage, claim
+from wipx.tasks.shared.story import leave_story
+from wipx.tasks.shared.trials import write_robot
 
 RELEASED_AT, LEANING = (0.03, 0.06), 0.01  # [rad] pitch at the start of a release, and of the other runs
 OURS = "lqr_equilibrium"  # controller under a load, unless another one is asked for

@@ -14,8 +14,8 @@ from wipx.identify.noise import sensor_noise
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.simulator import Simulator
-from wipx.tasks.job import Job
-from wipx.tasks.results import write_csv, write_json, written_together
+from wipx.tasks.files.results import write_csv, write_json, written_together
+from wipx.tasks.shared.job import Job
 
 HORIZON = 0.5  # [s], contract section 4
 

@@ -13,14 +13,14 @@ from wipx.identify.adaptation import LoadedTrials
 from wipx.identify.closed_loop import Sampling
 from wipx.learn.estimator import Estimator, Recipe, Workshop
 from wipx.report.numbers import significant
-from wipx.tasks.adapted import loaded_trials
 from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
-from wipx.tasks.estimation_files import plain_estimation
-from wipx.tasks.finished import finish, finished
-from wipx.tasks.job import Job
-from wipx.tasks.progress import StageProgress
-from wipx.tasks.results import flat, written_together
-from wipx.tasks.trials import trials_of
+from wipx.tasks.files.estimation import plain_estimation
+from wipx.tasks.files.finished import finish, finished
+from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.shared.adapted import loaded_trials
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import StageProgress
+from wipx.tasks.shared.trials import trials_of
 
 TIMED = 200  # estimates of one window each, of which the median time is taken
 

@@ -31,8 +31,8 @@ from wipx.proof.blind.page import write_results
 from wipx.proof.blind_robots.cases import DIRTY_TIERS, TIERS, stratified
 from wipx.proof.blind_robots.folder import RunFolder, read_json
 from wipx.proof.blind_robots.scenario import LENGTHS
-from wipx.tasks.job import Job
-from wipx.tasks.results import write_json
+from wipx.tasks.files.results import write_json
+from wipx.tasks.shared.job import Job
 
 EARLIER = "earlier"  # folder that takes finished runs
 DRAWING = ".drawing"  # folder of cases that are not all sealed yet

@@ -7,7 +7,7 @@ from wipx.core.errors import InputError
 from wipx.proof.blind.diagnosing import read_answers
 from wipx.proof.blind.judging import Opened, read_commitments, read_opened, scores_of, verified
 from wipx.proof.blind_robots.folder import RunFolder
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

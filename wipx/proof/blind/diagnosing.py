@@ -17,7 +17,7 @@ from wipx.proof.blind_robots import witness
 from wipx.proof.blind_robots.folder import RunFolder, read_json
 from wipx.proof.blind_robots.seal import digest_of_folder
 from wipx.proof.blind_robots.witness import READ, REFUSED
-from wipx.tasks.results import write_json
+from wipx.tasks.files.results import write_json
 
 OURS = "wipx"
 ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # a worker has one core

@@ -22,8 +22,8 @@ from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.baseline import NETWORK
+from wipx.tasks.files.results import write_json
 from wipx.tasks.predict import Predict
-from wipx.tasks.results import write_json
 
 SIMULATOR = AnalyticSimulator(threads=1)
 

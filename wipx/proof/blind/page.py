@@ -39,7 +39,7 @@ from wipx.report.score_page import (
     score_markdown,
     write_score_page,
 )
-from wipx.tasks.results import replace_table, write_json, written_together
+from wipx.tasks.files.results import replace_table, write_json, written_together
 
 SIGNAL_TO_NOISE = (
     "Cases with hidden physics, by the root mean square difference that it makes in the signal that shows it best, "

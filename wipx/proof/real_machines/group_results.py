@@ -11,7 +11,7 @@ import numpy as np
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.sizes import Size
 from wipx.proof.baseline_answers import MethodAnswer, NamedEffect
-from wipx.tasks.results import write_json
+from wipx.tasks.files.results import write_json
 
 FILE = "group.json"
 OURS = "wipx"

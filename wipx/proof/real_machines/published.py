@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol
 from wipx.core.errors import unknown_name
 from wipx.core.model import Model
 from wipx.recordings.model_file import check_keys, mapping_of, model_from_mapping
-from wipx.tasks.job import Job
+from wipx.tasks.shared.job import Job
 
 Naming = Literal["name", "tie", "same physics", "missed"]
 

@@ -28,8 +28,8 @@ from wipx.proof.unseen import unseen
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.diagnose import Diagnose
-from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table, write_json, written_together
+from wipx.tasks.files.results import replace_table, write_json, written_together
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

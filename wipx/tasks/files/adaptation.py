@@ -10,8 +10,8 @@ import numpy as np
 from wipx.core.adaptation import AdaptationResult, ClassTrajectory, GapLoss
 from wipx.core.errors import InputError
 from wipx.core.results import SearchHistory
-from wipx.tasks.finished import read_result
-from wipx.tasks.results import write_csv
+from wipx.tasks.files.finished import read_result
+from wipx.tasks.files.results import write_csv
 
 TRAJECTORIES = "trajectories.csv"
 

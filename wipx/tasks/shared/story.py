@@ -10,10 +10,10 @@ from wipx.hardware.target import Target
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.control_files import read_control
-from wipx.tasks.control_scenarios import ScenarioName
-from wipx.tasks.estimation_files import read_estimation
-from wipx.tasks.results import written_together
+from wipx.tasks.files.control import read_control
+from wipx.tasks.files.estimation import read_estimation
+from wipx.tasks.files.results import written_together
+from wipx.tasks.shared.control_scenarios import ScenarioName
 
 
 def leave_story(out: Path, target: Target, scenarios: tuple[ScenarioName, ...]) -> str:

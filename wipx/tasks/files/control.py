@@ -9,8 +9,8 @@ import numpy as np
 from wipx.core.control_result import ControlResult, ControlTrial, Course
 from wipx.core.errors import InputError
 from wipx.core.load import Load
-from wipx.tasks.finished import read_result
-from wipx.tasks.results import write_csv
+from wipx.tasks.files.finished import read_result
+from wipx.tasks.files.results import write_csv
 
 COURSES = "courses.csv"
 PER_TRIAL = tuple(item.name for item in fields(Course) if item.name != "t")

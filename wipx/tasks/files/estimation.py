@@ -9,7 +9,7 @@ import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.core.estimation import EstimationResult, Judged
-from wipx.tasks.finished import read_result
+from wipx.tasks.files.finished import read_result
 
 
 def plain_estimation(result: EstimationResult) -> dict[str, object]:

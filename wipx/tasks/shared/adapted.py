@@ -13,8 +13,8 @@ from wipx.library import feedback_of
 from wipx.recordings.model_file import read_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.job import Job
-from wipx.tasks.progress import SearchProgress
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.progress import SearchProgress
 
 UNLOADED = "unloaded"
 

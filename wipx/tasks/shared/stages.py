@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from wipx.core.errors import InputError
-from wipx.tasks.finished import SETTINGS
+from wipx.tasks.files.finished import SETTINGS
 
 COMMAND, LOG = "command.txt", "log.txt"
 INPUT_AT_FAULT = 2

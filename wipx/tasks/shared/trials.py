@@ -21,9 +21,9 @@ from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.cache import simulator_digest
-from wipx.tasks.job import Job
-from wipx.tasks.locked import locked
-from wipx.tasks.results import write_csv
+from wipx.tasks.files.locked import locked
+from wipx.tasks.files.results import write_csv
+from wipx.tasks.shared.job import Job
 
 FOLDER = Path("runs/trials")
 DECIDING = ("target", "controller", "plant")  # parts whose settings change what is recorded

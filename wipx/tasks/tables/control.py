@@ -6,10 +6,10 @@ from pathlib import Path
 
 from wipx.core.control_result import ControlResult
 from wipx.core.errors import InputError
-from wipx.tasks.control_files import read_control
-from wipx.tasks.finished import finished_jobs
-from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table, written_together
+from wipx.tasks.files.control import read_control
+from wipx.tasks.files.finished import finished_jobs
+from wipx.tasks.files.results import replace_table, written_together
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

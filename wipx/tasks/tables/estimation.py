@@ -6,10 +6,10 @@ from pathlib import Path
 
 from wipx.core.errors import InputError
 from wipx.core.estimation import EstimationResult
-from wipx.tasks.estimation_files import read_estimation
-from wipx.tasks.finished import finished_jobs
-from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table, written_together
+from wipx.tasks.files.estimation import read_estimation
+from wipx.tasks.files.finished import finished_jobs
+from wipx.tasks.files.results import replace_table, written_together
+from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)

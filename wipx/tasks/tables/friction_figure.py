@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.errors import InputError, check_positive, unknown_name
-from wipx.tasks.job import Job
-from wipx.tasks.results import write_csv, written_together
+from wipx.tasks.files.results import write_csv, written_together
+from wipx.tasks.shared.job import Job
 
 SYMBOLS = ("F_s", "F_c", "v_s", "sigma", "epsilon", "alpha")
 

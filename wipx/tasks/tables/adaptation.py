@@ -7,11 +7,11 @@ from pathlib import Path
 from wipx.core.adaptation import AdaptationResult
 from wipx.core.errors import InputError
 from wipx.recordings.model_file import read_model
-from wipx.tasks.adaptation_files import read_adaptation
-from wipx.tasks.finished import finished_jobs
-from wipx.tasks.job import Job
-from wipx.tasks.results import replace_table, write_csv, written_together
-from wipx.tasks.trials import hidden_file
+from wipx.tasks.files.adaptation import read_adaptation
+from wipx.tasks.files.finished import finished_jobs
+from wipx.tasks.files.results import replace_table, write_csv, written_together
+from wipx.tasks.shared.job import Job
+from wipx.tasks.shared.trials import hidden_file
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from wipx.core.control_result import FALL, RAIL_END, ControlTrial, Course
 from wipx.core.errors import check_positive
 from wipx.core.recording import Recording
-from wipx.tasks.control_scenarios import Scenario
+from wipx.tasks.shared.control_scenarios import Scenario
 
 FINE, COARSE = 0.005, 0.04  # [s] between samples that are judged, and that are kept
 LYING = 0.8  # [rad] beyond which a stopped robot has fallen

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from wipx.core.errors import InputError
-from wipx.tasks.job import Job
-from wipx.tasks.results import flat, write_json
+from wipx.tasks.files.results import flat, write_json
+from wipx.tasks.shared.job import Job
 
 RESULT = "result.json"
 SETTINGS = "config.yaml"  # stands beside the results of every task that has succeeded

@@ -1,0 +1,1 @@
+"""The files that tasks leave, all of them or none, and how a rerun finds them."""

@@ -1,0 +1,1 @@
+"""What several tasks need: the job, its progress, trials, adapted simulations, scenarios, stages."""

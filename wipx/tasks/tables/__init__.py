@@ -1,0 +1,1 @@
+"""Tasks that make tables and figures of finished sweeps."""
