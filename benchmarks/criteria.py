@@ -135,7 +135,7 @@ def rigs() -> Iterator[Case]:
     task: Any = OmegaConf.to_container(composed, resolve=True)
     for name, settings in task["cases"].items():
         case = instantiate(
-            {"_target_": "wipx.proof.real_machines.recordings.Case", **settings}, _recursive_=False, _convert_="all"
+            {"_target_": "wipx.proof.real_machines.recordings.Rig", **settings}, _recursive_=False, _convert_="all"
         )
         source = case.of(instantiate(task["sources"][settings["dataset"]], _convert_="all"))
         published = instantiate(settings["published"], _convert_="all")

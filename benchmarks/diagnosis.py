@@ -17,7 +17,7 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import noise_model_of
 from wipx.diagnosis.likelihood.observer import NoiseLevels, observer_gains
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.pipeline import Robot, diagnose
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
@@ -53,7 +53,7 @@ def measure_diagnosis() -> dict[str, float]:
         ROUNDS,
     )
     found = {name: timing.median for name, timing in parts.items()}
-    found["the whole diagnosis"] = processor_time(lambda: diagnose(recordings, Robot(nominal, {}), simulator))
+    found["the whole diagnosis"] = processor_time(lambda: diagnose(recordings, KnownRobot(nominal, {}), simulator))
     print_table(
         f"Diagnosis of {RECORDINGS} recordings of {DURATION:g} s, one thread; its parts for {LEVELS} noise levels",
         ("part", "processor s"),

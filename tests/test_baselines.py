@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from wipx.baselines.all_at_once import AllAtOnce
-from wipx.baselines.case import Case, Rival
+from wipx.baselines.case import Problem, Rival
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.baselines.motion import motions
 from wipx.baselines.network import ResidualAcceleration, read_network
@@ -63,8 +63,8 @@ def record(
     return tuple(Recording(f"r{r}.csv", {"t": t, "theta": theta[:, r], "u": command[:, r]}) for r in range(count))
 
 
-def case(effects: Effects, rng: np.random.Generator, noise: float = NOISE) -> Case:
-    return Case(record(effects, rng, noise=noise), pendulum({}), {}, SIMULATOR)
+def case(effects: Effects, rng: np.random.Generator, noise: float = NOISE) -> Problem:
+    return Problem(record(effects, rng, noise=noise), pendulum({}), {}, SIMULATOR)
 
 
 @pytest.mark.parametrize("name", NAMING)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wipx.baselines.case import Case
+from wipx.baselines.case import Problem
 from wipx.baselines.mujoco_problem import Piece
 from wipx.baselines.mujoco_sysid import MujocoSysid
 from wipx.baselines.rigid_body import RigidBody
@@ -109,7 +109,7 @@ def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: s
     rng = np.random.default_rng(fresh_seed)
     effect, _, symbol = name.rpartition(".")
     true, nominal = robot(kind, {effect: {symbol: value}}), robot(kind, {})
-    case = Case(record(true, rng), nominal, {}, SIMULATOR)
+    case = Problem(record(true, rng), nominal, {}, SIMULATOR)
     answer = RIVAL.answer(case, rng)
     assert answer.mismatch
     found = {f.name: f for f in answer.found}
@@ -123,7 +123,7 @@ def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: s
 def test_the_toolbox_finds_nothing_where_nothing_is_missing(mujoco: Any, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     model = robot("linear_axis", {})
-    answer = RIVAL.answer(Case(record(model, rng), model, {}, SIMULATOR), rng)
+    answer = RIVAL.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
     assert not answer.mismatch
     assert not answer.found
 
@@ -133,7 +133,7 @@ def test_an_uncertain_mass_is_corrected_and_not_named(mujoco: Any, fresh_seed: i
     rng = np.random.default_rng(fresh_seed)
     true = robot("linear_axis", {"translation/viscous": {"sigma": 1.5}})
     heavier = replace(true, parameters={**true.parameters, "body_mass": 2.2})
-    given = Case(record(heavier, rng), robot("linear_axis", {}), {"body_mass": 0.1}, SIMULATOR)
+    given = Problem(record(heavier, rng), robot("linear_axis", {}), {"body_mass": 0.1}, SIMULATOR)
     answer = RIVAL.answer(given, rng)
     assert [f.name for f in answer.found] == ["translation/viscous"]
     assert answer.model.parameters["body_mass"] == pytest.approx(2.2, rel=0.03)
@@ -155,5 +155,5 @@ def test_without_mujoco_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch):
     model = robot("linear_axis", {})
     rng = np.random.default_rng(0)
     with pytest.raises(InputError, match=r"needs MuJoCo's toolbox .*; pip install") as caught:
-        RIVAL.answer(Case(record(model, rng), model, {}, SIMULATOR), rng)
+        RIVAL.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
     assert "\n" not in str(caught.value)

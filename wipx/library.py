@@ -8,7 +8,7 @@ import numpy as np
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
 from wipx.core.recording import Recording
-from wipx.diagnosis.pipeline import Robot, diagnose
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.recordings.robot_file import RobotDescription, read_robot
 from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator
@@ -30,7 +30,7 @@ def diagnose_robot(
         recordings = source.load()
     if described is None:
         raise InputError("robot: recordings that come without a folder need a robot; give robot.yaml's path")
-    known = Robot(described.model, described.uncertainty, feedback_of(described))
+    known = KnownRobot(described.model, described.uncertainty, feedback_of(described))
     return diagnose(tuple(recordings), known, AnalyticSimulator(), title=title, source=where, suspects=suspects)
 
 

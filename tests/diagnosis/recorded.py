@@ -18,8 +18,7 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.pipeline import Robot as KnownRobot
-from wipx.diagnosis.pipeline import diagnose
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator

@@ -40,7 +40,7 @@ def test_means_of_commands_may_feign_what_swings(
         shape = next(shape for shape in shapes if shape.kind == "resonance")
         return [Residual(shape, 100.0, 1e-12, np.zeros((fit.white.size, 2)))]
 
-    monkeypatch.setattr(confirmation, "leftovers", seeming)
+    monkeypatch.setattr(confirmation, "residual_tests", seeming)
     robot = bench("linear_axis", {}, fresh_seed)
     means = slow(robot.recordings, np.random.default_rng(fresh_seed))
     answer = Bench(robot.nominal, means if averaged else robot.recordings, {}).diagnosed()

@@ -69,9 +69,9 @@ def test_nothing_is_found_when_nothing_is_missing(kind: str, fresh_seed: int):
 
 @pytest.mark.parametrize("kind", ["wip", pytest.param("pendulum", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("log", LOGS)
-def test_a_poor_log_is_no_physics(data: str, kind: str, fresh_seed: int):
+def test_a_poor_log_is_no_physics(log: str, kind: str, fresh_seed: int):
     well = bench(kind, {}, fresh_seed)
-    poorly = LOGS[data](well.recordings, np.random.default_rng(fresh_seed))
+    poorly = LOGS[log](well.recordings, np.random.default_rng(fresh_seed))
     answer = Bench(well.nominal, poorly, {}).diagnosed()
     assert (answer.verdict, answer.effects) == ("consistent", ())
 
@@ -96,10 +96,10 @@ def test_one_effect_is_named_with_its_size(name: str, fresh_seed: int):
         "slow",
     ],
 )
-def test_friction_is_named_in_a_poor_log(data: str):
+def test_friction_is_named_in_a_poor_log(log: str):
     truth = {"translation/coulomb": {"F_c": 1.0}}
     well = bench("wip", truth, seed=5, count=3)
-    poorly = LOGS[data](well.recordings, np.random.default_rng(5))
+    poorly = LOGS[log](well.recordings, np.random.default_rng(5))
     assert_found(Bench(well.nominal, poorly, {}).diagnosed(), truth)
 
 

@@ -11,7 +11,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.pipeline import Robot, diagnose
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.search import Selection
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
@@ -116,7 +116,7 @@ def test_a_recording_that_is_left_out_does_not_count(fresh_seed: int):
 
 def test_what_stays_is_told(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
-    answer = diagnose(case.recordings, Robot(case.nominal, {}), SIMULATOR)
+    answer = diagnose(case.recordings, KnownRobot(case.nominal, {}), SIMULATOR)
     left = answer.remainder
     assert left is not None
     assert 0.0 < left.share_gone <= 1.0

@@ -76,7 +76,7 @@ def example(folder: Path) -> tuple[Model, Recordings]:
 
 
 @pytest.mark.parametrize("name", MISSING)
-def test_missing_physics_is_no_slip(name: str, fresh_seed: int):
+def test_missing_physics_is_no_mistake(name: str, fresh_seed: int):
     model = nominal_model("wip")
     recordings = Robot(model.with_effects(MISSING[name])).record(np.random.default_rng(fresh_seed), 2)
     checked(model, recordings, tuple(MISSING[name]))
@@ -88,7 +88,7 @@ def test_examples_are_plausible(name: str, examples: Path):
 
 
 @pytest.mark.parametrize("undone", SLIPS_OF["wip"])
-def test_slips_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
+def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
     model = nominal_model("wip")
     recordings = Robot(model.with_effects(MISSING["gain"])).record(np.random.default_rng(fresh_seed), 2)
     mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
@@ -99,7 +99,7 @@ def test_slips_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
 
 
 @pytest.mark.parametrize("undone", SLIPS_OF["pendulum"])
-def test_slips_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
+def test_mistakes_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
     model = nominal_model("pendulum")
     recordings = Robot(model.with_effects({"pitch/coulomb": {"F_c": 0.2}})).record(np.random.default_rng(fresh_seed))
     mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
@@ -107,7 +107,7 @@ def test_slips_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
         checked(*with_slip(mistake, model, recordings), ("pitch/viscous",))
 
 
-@pytest.mark.parametrize("slip", BAD_UNITS, ids=lambda mistake: mistake.undone)
+@pytest.mark.parametrize("mistake", BAD_UNITS, ids=lambda mistake: mistake.undone)
 @pytest.mark.parametrize("kind", ["wip", "pendulum"])
 def test_numbers_in_a_wrong_unit_are_named(kind: str, mistake: Mistake, fresh_seed: int):
     model = nominal_model(kind)

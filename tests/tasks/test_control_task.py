@@ -21,7 +21,7 @@ from wipx.hardware.target import LoadChange, Push, Trial
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.tasks.files.control import plain_control, read_control, write_courses
 from wipx.tasks.files.results import write_json
-from wipx.tasks.shared.control_metrics import Judge, settled
+from wipx.tasks.shared.control_metrics import TrialJudge, settled
 from wipx.tasks.shared.control_scenarios import SCENARIOS
 from wipx.tasks.tables.control import by_scenario
 
@@ -72,7 +72,7 @@ def test_errors_and_recovery_of_a_known_course():
     t = np.arange(6501) / 650.0
     x = np.where(t < 4.0, 1.0, 0.1)
     theta = -0.1 + np.where(t < 2.0, 0.3, 0.0)
-    trial = Judge(SCENARIOS["balancing"], 0.4, 0.06).judged(recorded(t, x, theta), "a1", 1, -0.1, -0.12)
+    trial = TrialJudge(SCENARIOS["balancing"], 0.4, 0.06).judged(recorded(t, x, theta), "a1", 1, -0.1, -0.12)
     assert trial.failure is None
     assert trial.rmse_x == pytest.approx(np.sqrt(0.4 + 0.6 * 0.01), rel=2e-3)
     assert trial.rmse_pitch == pytest.approx(0.3 * np.sqrt(0.2), rel=2e-3)
@@ -84,7 +84,7 @@ def test_errors_count_from_where_tracking_begins_and_from_its_reference():
     scenario = SCENARIOS["tracking"]
     t = np.arange(0.0, scenario.duration + 1e-9, 2e-3)
     asked = np.array([scenario.reference(time)[0] for time in t])
-    trial = Judge(scenario, 0.4, 0.06).judged(
+    trial = TrialJudge(scenario, 0.4, 0.06).judged(
         recorded(t, asked + np.where(t < 4.9, 2.0, 0.05), np.zeros(len(t))), "a1", 1, 0.0, None
     )
     assert trial.rmse_x == pytest.approx(0.05, rel=1e-6)
@@ -95,7 +95,7 @@ def test_errors_count_from_where_tracking_begins_and_from_its_reference():
 def test_a_robot_that_was_stopped_counts_to_the_end_with_its_last_place(last: tuple[float, float], why: str):
     t = np.linspace(0.0, 1.0, 651)
     run = recorded(t, last[0] * t, last[1] * t)
-    trial = Judge(SCENARIOS["balancing"], 10.0, 10.0).judged(run, "a1", 1, 0.0, None)
+    trial = TrialJudge(SCENARIOS["balancing"], 10.0, 10.0).judged(run, "a1", 1, 0.0, None)
     assert (trial.failure, trial.recovery) == (why, None)
     assert trial.stopped == pytest.approx(1.0)
     assert trial.rmse_x == pytest.approx(last[0] * np.sqrt((1.0 / 3.0 + 9.0) / 10.0), rel=2e-3)

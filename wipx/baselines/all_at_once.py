@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import cma
 import numpy as np
 
-from wipx.baselines.case import Answer, Case, Found
+from wipx.baselines.case import Answer, Found, Problem
 from wipx.baselines.prediction_search import PredictionSearch, at, needed
 from wipx.core.errors import check_positive
 from wipx.effects.catalogue import effect_of
@@ -39,7 +39,7 @@ class AllAtOnce:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, population=self.population)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Search, keep what the predictions need, search again."""
         search = PredictionSearch.of(case)
         begun = time.monotonic()  # the simulator is compiled by now
@@ -81,7 +81,7 @@ class AllAtOnce:
         return best
 
 
-def _all_together(case: Case) -> tuple[str, ...]:
+def _all_together(case: Problem) -> tuple[str, ...]:
     """Effects that can act together, as many as possible."""
     names = case.vocabulary
     contained = {

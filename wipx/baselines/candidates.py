@@ -10,7 +10,7 @@ from itertools import product
 
 import numpy as np
 
-from wipx.baselines.case import Case
+from wipx.baselines.case import Problem
 from wipx.baselines.torque import TorqueData
 from wipx.core.effect import Effect
 from wipx.effects.catalogue import effect_of
@@ -48,7 +48,7 @@ class Candidate:
         return values
 
 
-def candidates(case: Case, data: TorqueData) -> tuple[Candidate, ...]:
+def candidates(case: Problem, data: TorqueData) -> tuple[Candidate, ...]:
     """All candidates that change the torque residual at all."""
     base = data.residual(case.nominal)
     found = []
@@ -65,7 +65,7 @@ def candidates(case: Case, data: TorqueData) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-def _doses(effect: Effect, name: str, case: Case) -> Iterator[dict[str, float]]:
+def _doses(effect: Effect, name: str, case: Problem) -> Iterator[dict[str, float]]:
     """Values of the grid [SI]; one dose of parameters in proportion to which the effect grows."""
     scales = case.scales[name.partition("/")[0]]
     axes = []

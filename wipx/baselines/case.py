@@ -19,7 +19,7 @@ from wipx.sim.analytic import AnalyticSimulator
 
 
 @dataclass(frozen=True)
-class Case:
+class Problem:
     """Recordings of a robot, and what its owner believes of it.
 
     Attributes:
@@ -111,6 +111,6 @@ class Rival(Protocol):
         """Its budget of time [s]."""
         ...
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Complete the model of a case within the budget, and name what was missing."""
         ...

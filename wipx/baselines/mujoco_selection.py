@@ -17,7 +17,7 @@ STEPS = 2  # of the others, after a removal
 
 
 @dataclass(frozen=True)
-class Selection:
+class MujocoSelection:
     """What is left of a fit.
 
     Attributes:
@@ -29,7 +29,7 @@ class Selection:
     growth: Mapping[str, float]
 
     @classmethod
-    def of(cls, problem: ToolboxProblem, cube: np.ndarray, effects: tuple[str, ...]) -> "Selection":
+    def of(cls, problem: ToolboxProblem, cube: np.ndarray, effects: tuple[str, ...]) -> "MujocoSelection":
         """Remove what matters least, again and again, while the loss stays within `LOSS_WITHOUT` of that of the fit."""
         names = problem.space.names
         own = {e: np.array([name.rpartition(".")[0] == e for name in names]) for e in effects}

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.baselines.case import Answer, Case, Found
+from wipx.baselines.case import Answer, Found, Problem
 from wipx.baselines.mujoco_problem import DIFFERENCE, Toolbox, ToolboxProblem, is_expressible
-from wipx.baselines.mujoco_selection import Selection
+from wipx.baselines.mujoco_selection import MujocoSelection
 from wipx.baselines.prediction_search import PredictionSearch, at
 from wipx.core.errors import InputError, check_positive
 
@@ -42,7 +42,7 @@ class MujocoSysid:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, windows=self.windows)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Fit all numbers, keep the effects that the predictions need, fit again."""
         toolbox = _toolbox()
         search = PredictionSearch.of(case)
@@ -51,14 +51,14 @@ class MujocoSysid:
         with _silent(toolbox):
             problem = self._problem(search, names, toolbox)
             fit = _fitted(problem, problem.space.neutral, begun + FIRST_SHARE * self.seconds)
-            selection = Selection.of(fit.problem, fit.cube, names)
+            selection = MujocoSelection.of(fit.problem, fit.cube, names)
             if not selection.growth:
                 return Answer(case.nominal, (), mismatch=False, notes=_notes(case))
             lean = self._problem(search, tuple(selection.growth), toolbox)
             values = dict(zip(problem.space.names, problem.space.to_values(selection.cube), strict=True))
             start = lean.space.to_cube(np.array([values[name] for name in lean.space.names]))
             fit = _fitted(lean.about(start), start, begun + self.seconds)
-            selection = Selection.of(fit.problem, fit.cube, tuple(selection.growth))
+            selection = MujocoSelection.of(fit.problem, fit.cube, tuple(selection.growth))
         model = at(lean.space, selection.cube)
         found = tuple(_found(case, name, dict(model.effects[name]), g) for name, g in selection.growth.items())
         return Answer(model, found, bool(found), notes=_notes(case))
@@ -110,11 +110,11 @@ def _fitted(problem: ToolboxProblem, start: np.ndarray, deadline: float) -> _Fit
             return best
 
 
-def _found(case: Case, name: str, values: dict[str, float], weight: float) -> Found:
+def _found(case: Problem, name: str, values: dict[str, float], weight: float) -> Found:
     return Found(name, values, weight, tuple(other for other in _equivalent(case, name) if other in case.vocabulary))
 
 
-def _equivalent(case: Case, name: str) -> tuple[str, ...]:
+def _equivalent(case: Problem, name: str) -> tuple[str, ...]:
     """Effects that no recording tells from one of the toolbox's."""
     if name == "sensor_theta/bias":
         return ("geometry/com_offset",)
@@ -124,7 +124,7 @@ def _equivalent(case: Case, name: str) -> tuple[str, ...]:
     return ()
 
 
-def _notes(case: Case) -> tuple[str, ...]:
+def _notes(case: Problem) -> tuple[str, ...]:
     """What of the owner's model the toolbox cannot have."""
     lost = [name for name in case.nominal.effects if not is_expressible(name)]
     return (f"MuJoCo's toolbox fitted without {', '.join(lost)}, which it lacks.",) if lost else ()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.baselines.case import Answer, Case, Found
+from wipx.baselines.case import Answer, Found, Problem
 from wipx.baselines.prediction_search import LOSS_WITHOUT, PredictionSearch, at
 from wipx.core.errors import check_positive
 from wipx.core.model import Model
@@ -45,7 +45,7 @@ class PaperFriction:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, particles=self.particles, iterations=self.iterations)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Fit the friction, then ask of each term whether the predictions need it."""
         bare, owners = _without_friction(case.nominal)
         problem = _narrowed(

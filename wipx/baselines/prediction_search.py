@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.baselines.case import Case
+from wipx.baselines.case import Problem
 from wipx.core.model import Model, ModelBatch
+from wipx.core.results import HORIZON
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
 from wipx.identify.prediction import Prediction, Predictor
@@ -18,7 +19,6 @@ from wipx.identify.problem import WindowProblem
 from wipx.identify.windows import Windows, cut
 from wipx.sim.inputs import Inputs
 
-HORIZON = 0.5  # [s], contract section 4
 LEAD = 0.1  # [s] before a prediction, from which its state is estimated; one correction does for so short a time
 WINDOWS = 48  # that are predicted; of more, an even choice
 STEP = 2.5e-3  # [s] of the integrator; twice as quick as the usual one, and exact enough for a search
@@ -71,11 +71,11 @@ class PredictionSearch:
         predictor: Predicts its windows.
     """
 
-    case: Case
+    case: Problem
     predictor: CorrectedPredictor
 
     @classmethod
-    def of(cls, case: Case) -> "PredictionSearch":
+    def of(cls, case: Problem) -> "PredictionSearch":
         """For an even choice of the case's windows.
 
         Raises:

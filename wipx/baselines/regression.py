@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.baselines.candidates import Candidate, candidates
-from wipx.baselines.case import Answer, Case, Found, excluded
+from wipx.baselines.case import Answer, Found, Problem, excluded
 from wipx.baselines.motion import motions
 from wipx.baselines.torque import TorqueData
 from wipx.baselines.torque_fit import TorqueFit, TorqueFitter
@@ -37,7 +37,7 @@ class TorqueRegression:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, effects=self.effects)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Add the best effect as long as the criterion rises, then drop those that it does not need."""
         deadline = time.monotonic() + self.seconds
         data = TorqueData(motions(case.recordings, case.nominal.plant, case.noise))
@@ -62,13 +62,13 @@ class TorqueRegression:
         return Answer(best.model, found, bool(found))
 
 
-def _criterion(fit: TorqueFit, current: TorqueFit, case: Case) -> float:
+def _criterion(fit: TorqueFit, current: TorqueFit, case: Problem) -> float:
     """Criterion of a fit, the number of independent rows being that of the `current` model."""
     parameters = sum(len(effect_of(name, case.nominal.plant).parameters) for name in fit.effects)
     return replace(fit, independent=current.independent).criterion(parameters)
 
 
-def _next(fit: TorqueFit, pool: tuple[Candidate, ...], case: Case) -> list[dict[str, Mapping[str, float]]]:
+def _next(fit: TorqueFit, pool: tuple[Candidate, ...], case: Problem) -> list[dict[str, Mapping[str, float]]]:
     """Effects from which the next fits begin: each with one more, the most promising ones."""
     present = {name: fit.model.effects[name] for name in fit.effects}
     allowed = [
@@ -95,7 +95,7 @@ def _size(candidate: Candidate, column: np.ndarray, residual: np.ndarray) -> flo
     return size if candidate.signed else max(size, 0.0)
 
 
-def _pruned(best: TorqueFit, fitter: TorqueFitter, case: Case) -> TorqueFit:
+def _pruned(best: TorqueFit, fitter: TorqueFitter, case: Problem) -> TorqueFit:
     """Without the effects that the criterion no longer needs beside the later ones."""
     while len(best.effects) > 1:
         leanest = max(fitter.without_each(best).values(), key=lambda t: _criterion(t, best, case))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wipx.baselines.case import Answer, Case
+from wipx.baselines.case import Answer, Problem
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.baselines.motion import Motion, motions
 from wipx.baselines.network import ResidualAcceleration
@@ -43,7 +43,7 @@ class ResidualNetwork:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, hidden=self.hidden)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Train on two thirds of every recording, stop by the last third."""
         torch = _torch()
         data = TorqueData(motions(case.recordings, case.nominal.plant, case.noise))
@@ -99,7 +99,7 @@ class ResidualNetwork:
         return ResidualAcceleration(low, high, first, second, last, scale), explained
 
 
-def _predicts_better(case: Case, network: ResidualAcceleration) -> bool:
+def _predicts_better(case: Problem, network: ResidualAcceleration) -> bool:
     """Whether 0.5 s predictions of the last recording gain; a good acceleration can still fall over in a rollout."""
     judge = Judge(case.simulator, case.noise, 0.5)
     learned = replace(judge, simulator=learned_simulator(network, case.noise))

@@ -16,7 +16,7 @@ from pysindy.utils import AxesArray
 from scipy.integrate import cumulative_trapezoid
 
 from wipx.baselines.candidates import Candidate, candidates
-from wipx.baselines.case import Answer, Case, Found, excluded
+from wipx.baselines.case import Answer, Found, Problem, excluded
 from wipx.baselines.motion import motions
 from wipx.baselines.torque import TorqueData
 from wipx.baselines.torque_fit import TorqueFitter
@@ -47,7 +47,7 @@ class SparseRegression:
     def __post_init__(self) -> None:
         check_positive(seconds=self.seconds, terms=self.terms)
 
-    def answer(self, case: Case, rng: np.random.Generator) -> Answer:
+    def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Screen one column per effect, fit all of them, keep the large ones."""
         deadline = time.monotonic() + self.seconds
         data = TorqueData(motions(case.recordings, case.nominal.plant, case.noise))
@@ -78,7 +78,7 @@ def _best_column_each(pool: tuple[Candidate, ...], target: np.ndarray, weights: 
     return [candidate for _, candidate in best.values()]
 
 
-def _nuisances(case: Case, data: TorqueData, discrepancy: np.ndarray) -> list[np.ndarray]:
+def _nuisances(case: Problem, data: TorqueData, discrepancy: np.ndarray) -> list[np.ndarray]:
     """Columns of the uncertain nominal numbers."""
     moved = (
         case.nominal.with_values({name: case.nominal.value(name) * (1.0 + NUDGE * deviation)})
@@ -182,7 +182,7 @@ def _cross_validated(weak: WeakForm, rng: np.random.Generator) -> np.ndarray:
 
 
 def _sensible(
-    case: Case, chosen: list[Candidate], shares: np.ndarray, sizes: np.ndarray, most: int
+    case: Problem, chosen: list[Candidate], shares: np.ndarray, sizes: np.ndarray, most: int
 ) -> dict[str, Mapping[str, float]]:
     """The terms that make physical sense, the largest first: their values by name.
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import least_squares
 
-from wipx.baselines.case import Case
+from wipx.baselines.case import Problem
 from wipx.baselines.torque import TorqueData
 from wipx.core.model import Model
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
@@ -66,7 +66,7 @@ class TorqueFitter:
         data: Its smoothed recordings.
     """
 
-    case: Case
+    case: Problem
     data: TorqueData
 
     def fit(self, effects: Mapping[str, Mapping[str, float]], weights: np.ndarray | None = None) -> TorqueFit:

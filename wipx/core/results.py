@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+HORIZON = 0.5  # [s] of predictions, contract section 4
+NINETY_FIVE = 1.96  # standard deviations of a Gaussian, to either side, that hold 95 %
+
 
 @dataclass(frozen=True)
 class Estimate:

@@ -44,7 +44,7 @@ def unwatched(stage: str, share: float) -> None:
 
 
 @dataclass(frozen=True)
-class Robot:
+class KnownRobot:
     """What a diagnosis knows of a robot beforehand.
 
     Attributes:
@@ -60,7 +60,7 @@ class Robot:
 
 def diagnose(
     recordings: tuple[Recording, ...],
-    robot: Robot,
+    robot: KnownRobot,
     simulator: AnalyticSimulator,
     *,
     title: str = "",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wipx.baselines.case import Case, Rival
+from wipx.baselines.case import Problem, Rival
 from wipx.core.errors import InputError, unknown_name
 from wipx.proof.unseen import Unseen
 from wipx.recordings.source import RecordingSource
@@ -73,7 +73,7 @@ def ask(job: Job, method: str, settings: object, source: RecordingSource, unseen
     rival: Rival = job.build(settings, f"task.methods.{method}")
     description = source.describe()
     nominal = job.part("plant").nominal(description.model)
-    case = Case(source.load(), nominal, description.uncertainty, job.part("sim"))
+    case = Problem(source.load(), nominal, description.uncertainty, job.part("sim"))
     begun = time.perf_counter()
     try:
         answer = rival.answer(case, np.random.default_rng(job.seed))

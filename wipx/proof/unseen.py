@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.core.results import FitErrors, Trace
-from wipx.diagnosis.decision.context import HORIZON
+from wipx.core.results import HORIZON, FitErrors, Trace
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.source import RecordingSource

@@ -26,7 +26,7 @@ PLANTS = MappingProxyType(
     }
 )
 SURE = 0.999  # probabilities beyond are not told apart
-CERTAIN = 1e-3  # probability of chance below which something is certain, though it may be small
+NO_CHANCE = 1e-3  # probability of chance below which something is certain, though it may be small
 
 
 def capitalised(text: str) -> str:
@@ -136,7 +136,7 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     left = diagnosis.unexplained
     chance = p_value(left.p_value)
     aside = f" ({chance})" if chance else ""
-    if not left.significant and left.p_value < CERTAIN:
+    if not left.significant and left.p_value < NO_CHANCE:
         return f"What is left over is not chance, but too small to be named{aside}."
     if not left.significant:
         return f"Nothing significant is left over{aside}."

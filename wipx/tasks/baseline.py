@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.baselines.case import Answer, Case, Found, Rival
+from wipx.baselines.case import Answer, Found, Problem, Rival
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.core.effect import Effect
 from wipx.core.plant import Plant
-from wipx.core.results import FitErrors
+from wipx.core.results import HORIZON, FitErrors
 from wipx.effects.catalogue import effect_of
 from wipx.identify.evaluation import Judge
 from wipx.identify.windows import check_long_enough
@@ -19,7 +19,6 @@ from wipx.recordings.source import RecordingSource
 from wipx.tasks.files.results import flat, write_json, written_together
 from wipx.tasks.shared.job import Job
 
-HORIZON = 0.5  # [s], contract section 4
 NETWORK = "residual.npz"
 
 
@@ -34,7 +33,7 @@ class RunRival:
         nominal = job.part("plant").nominal(description.model)
         recordings = source.load()
         check_long_enough(recordings)
-        case = Case(recordings, nominal, description.uncertainty, job.part("sim"))
+        case = Problem(recordings, nominal, description.uncertainty, job.part("sim"))
         rival: Rival = job.part("rival")
         begun = time.perf_counter()
         answer = rival.answer(case, np.random.default_rng(job.seed))
@@ -52,7 +51,7 @@ class RunRival:
         print(f"{content['verdict']}: {named}; {seconds:.1f} s; written to {job.out}")
 
 
-def _errors(case: Case, answer: Answer) -> FitErrors:
+def _errors(case: Problem, answer: Answer) -> FitErrors:
     """Prediction errors on the recordings that were fitted."""
     judge = Judge(case.simulator, case.noise, HORIZON)
     errors, _ = judge.compare(case.nominal, answer.model, case.recordings, held_out=False)
@@ -63,7 +62,7 @@ def _errors(case: Case, answer: Answer) -> FitErrors:
     return FitErrors(errors.horizon, errors.windows, errors.nominal, black_box.completed, black_box.noise_floor)
 
 
-def diagnosis(answer: Answer, errors: FitErrors, case: Case) -> dict[str, object]:
+def diagnosis(answer: Answer, errors: FitErrors, case: Problem) -> dict[str, object]:
     """What a rival can fill of diagnosis.json, contract section 5; it has no intervals and no probabilities."""
     plant = case.nominal.plant
     total = sum(found.weight for found in answer.found) or 1.0
@@ -98,7 +97,7 @@ def _regions(answer: Answer) -> list[dict[str, object]]:
     return [{"signal": "x", "low": spot["lo"], "high": spot["hi"], "share": 1.0} for spot in spots]
 
 
-def _times(answer: Answer, case: Case) -> list[dict[str, object]]:
+def _times(answer: Answer, case: Problem) -> list[dict[str, object]]:
     """From when on a payload is there, in each recording."""
     events = [found.parameters["t0"] for found in answer.found if found.name.endswith("/payload_event")]
     return [

@@ -23,7 +23,7 @@ from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.control import plain_control, write_courses
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import flat, written_together
-from wipx.tasks.shared.control_metrics import Judge
+from wipx.tasks.shared.control_metrics import TrialJudge
 from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioName
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
@@ -73,9 +73,9 @@ class Control:
         if not self.loads:
             raise InputError("task.loads is empty; name loads of the target")
 
-    def judge(self) -> Judge:
+    def judge(self) -> TrialJudge:
         """What counts."""
-        return Judge(SCENARIOS[self.scenario], self.near, self.upright)
+        return TrialJudge(SCENARIOS[self.scenario], self.near, self.upright)
 
     def run(self, job: Job) -> None:
         """Prepare model and controller, run all trials, judge, write; nothing where it was done before."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
-from wipx.diagnosis.pipeline import Robot, diagnose
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
@@ -45,7 +45,9 @@ class Diagnose:
             raise InputError("a diagnosis follows recordings with an observer, which sim=analytic alone has; choose it")
         description = source.describe()
         recordings = source.load()
-        robot = Robot(job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description))
+        robot = KnownRobot(
+            job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description)
+        )
         with StageProgress("diagnose") as progress:
             diagnosis = diagnose(
                 recordings,

@@ -8,7 +8,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.core.results import FitErrors, Trace
+from wipx.core.results import HORIZON, FitErrors, Trace
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.recordings.model_file import read_model
@@ -16,8 +16,6 @@ from wipx.recordings.source import RecordingSource
 from wipx.sim.simulator import Simulator
 from wipx.tasks.files.results import write_csv, write_json, written_together
 from wipx.tasks.shared.job import Job
-
-HORIZON = 0.5  # [s], contract section 4
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ from wipx.core.effect import Effect
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.parameters import Scales
-from wipx.core.results import Estimate
+from wipx.core.results import NINETY_FIVE, Estimate
 from wipx.diagnosis.candidates.screening import candidates_beside
 from wipx.diagnosis.decision.confirmation import Rest
 from wipx.diagnosis.decision.context import Context
-from wipx.diagnosis.decision.estimates import NINETY_FIVE, estimates
+from wipx.diagnosis.decision.estimates import estimates
 from wipx.diagnosis.decision.held_out import transfer
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting

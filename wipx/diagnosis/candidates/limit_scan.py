@@ -15,7 +15,7 @@ GUESSES = 6
 TOGETHER = 24  # limits whose responses are kept at once; bounds the memory
 LIMITS = np.geomspace(0.05, 1.5, 36)  # of the largest command
 SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of the largest speed
-ALIKE = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
+SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 
 def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
@@ -78,4 +78,4 @@ def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.nda
 
 def _differ(one: np.ndarray, other: np.ndarray) -> bool:
     stalls = max(one[0], other[0]) / min(one[0], other[0])
-    return bool(stalls > ALIKE or one[1] != other[1])
+    return bool(stalls > SAME_LIMIT or one[1] != other[1])

@@ -16,8 +16,8 @@ FREQUENCIES = 60  # that are looked at
 TURNED = 1.5  # [rad] of phase over the whole way, by which neighbouring frequencies differ
 APART = 2  # frequencies nearer to a peak belong to it
 BINS = 40  # pieces of the way
-ALIKE = 0.7  # share that two spots have in common, from which they count as one
-RIDGE = 1e-9
+SAME_SPOT = 0.7  # share that two spots have in common, from which they count as one
+REGULARISATION = 1e-9
 
 
 def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray
         slopes = slopes - basis @ (basis.T @ slopes)
         for i in range(part.size):
             pair = slopes[:, [i, i + part.size]]
-            force = -np.linalg.solve(pair.T @ pair + RIDGE * np.eye(2), pair.T @ left)
+            force = -np.linalg.solve(pair.T @ pair + REGULARISATION * np.eye(2), pair.T @ left)
             found.append((-0.5 * float(left @ (pair @ force)), np.hypot(*force), np.arctan2(-force[1], force[0])))
     gains, amplitudes, phases = np.array(found).T
     best: list[int] = []
@@ -77,11 +77,11 @@ def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.nd
     normal[1:, 1:] = np.cumsum(np.cumsum(slopes.T @ slopes, axis=0), axis=1)
     low, high = np.triu_indices(BINS + 1, 1)
     total = normal[high, high] - normal[low, high] - normal[high, low] + normal[low, low]
-    level = -(score[high] - score[low]) / np.maximum(total, RIDGE)
+    level = -(score[high] - score[low]) / np.maximum(total, REGULARISATION)
     gains = np.where(level > 0.0, 0.5 * level**2 * total, 0.0)
     best: list[int] = []
     for i in np.argsort(-gains):
-        if gains[i] > 0.0 and all(_common(low[[i, j]], high[[i, j]]) < ALIKE for j in best):
+        if gains[i] > 0.0 and all(_common(low[[i, j]], high[[i, j]]) < SAME_SPOT for j in best):
             best.append(int(i))
     chosen = best[:PEAKS]
     return np.column_stack([level[chosen], edges[low[chosen]], edges[high[chosen]]])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.core.recording import Recording
-from wipx.core.results import FitErrors
+from wipx.core.results import HORIZON, FitErrors
 from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
@@ -18,7 +18,6 @@ from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
 
-HORIZON = 0.5  # [s] of predictions, contract section 4
 FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
 FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's predictions
 # Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In

@@ -7,7 +7,7 @@ import numpy as np
 from wipx.core.diagnosis import Bound
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
-from wipx.core.results import Estimate
+from wipx.core.results import NINETY_FIVE, Estimate
 from wipx.diagnosis.candidates.screening import Candidate
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.nonsmooth_search import alike
@@ -16,7 +16,6 @@ from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
 
-NINETY_FIVE = 1.96  # standard deviations
 LAW_MISFIT = 5e-4  # share of the evidence that a law may miss though it is the right one; widens intervals
 UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
 NUDGE = 0.05  # relative change of the spread, to see what it does

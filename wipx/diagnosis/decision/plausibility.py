@@ -14,6 +14,7 @@ from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
+from wipx.core.results import HORIZON
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
@@ -27,7 +28,6 @@ from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
 
-HORIZON = 0.5  # [s] of predictions, contract section 4
 PROBE_SPAN = 3.0  # [s] of a recording; a gross error shows in every second of it
 PROBE_RECORDINGS = 4
 ROUNDS = 3  # of noise levels and values in turn
@@ -36,7 +36,7 @@ QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins
 GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
 RUN_AWAY = 0.01  # share of rows in which a model is nowhere near the recording
 LEAST_MOTION = 0.005  # [m, rad] that a recorded robot travels
-ALIKE = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
+HARMLESS = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _units_of_columns(nominal: Model) -> list[Mistake]:
         columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
         found.append(Mistake("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
     radius = nominal.parameters.get("wheel_radius", 1.0)
-    if "x" in plant.coordinates and abs(np.log(radius)) > ALIKE:
+    if "x" in plant.coordinates and abs(np.log(radius)) > HARMLESS:
         remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
         found.append(Mistake("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
     return found

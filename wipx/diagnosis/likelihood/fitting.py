@@ -29,7 +29,7 @@ DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
 LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
-POLISHED = 0.5  # nats at which alternating ends
+ALTERNATION_ENDS = 0.5  # nats at which alternating ends
 
 
 class Noise(Protocol):

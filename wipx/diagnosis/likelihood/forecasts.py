@@ -22,7 +22,8 @@ from scipy.special import stdtrit
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
+from wipx.core.results import HORIZON
+from wipx.diagnosis.likelihood.fitting import ALTERNATION_ENDS, LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import NoiseLevels
@@ -34,7 +35,6 @@ from wipx.identify.starts import leads_of, starts_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
 
-HORIZON = 0.5  # [s] of the longest prediction, contract section 4
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
 SPACING = 0.005  # [s] of the rows of condensed logs, about
 STRIDE = 0.25  # [s] from one start to the next
@@ -315,7 +315,7 @@ class ForecastFitter(Fitter):
         """Starts and values in turn until neither gains more."""
         for _ in range(rounds):
             again = self.fit(fit.hypothesis, self.anchored(fit.hypothesis.model, [fit.levels.bandwidths]))
-            if again.log_likelihood < fit.log_likelihood + POLISHED:
+            if again.log_likelihood < fit.log_likelihood + ALTERNATION_ENDS:
                 return max(fit, again, key=lambda each: each.log_likelihood)
             fit = again
         return fit

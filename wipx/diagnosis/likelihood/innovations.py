@@ -12,7 +12,7 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, POLISHED, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import ALTERNATION_ENDS, LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, whitened
@@ -143,7 +143,7 @@ class InnovationFitter(Fitter):
         for _ in range(rounds):
             before = fit.log_likelihood
             fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
-            if fit.log_likelihood - before < POLISHED:
+            if fit.log_likelihood - before < ALTERNATION_ENDS:
                 break
         return fit
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.core.diagnosis import Experiment, NextExperiment
+from wipx.core.results import NINETY_FIVE
 from wipx.diagnosis.likelihood.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
@@ -18,7 +19,7 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance, inflation
 from wipx.diagnosis.next_experiment.excitations import Reach, excitations_for, how, prescribed
-from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, Trial, loaded
+from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, SimulatedRun, loaded
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import StateFeedback
 
@@ -27,7 +28,6 @@ STEPS = 3  # of a rival's fit to a simulated run
 USELESS = 1.0  # standard deviations below which an experiment settles nothing
 DECISIVE = 3.0  # standard deviations that settle a question
 MOST_REPEATS = 20
-UNSEEN = 1.96  # standard deviations; a smaller number may be as large as this without being seen
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class _Asked:
         found = []
         for i in self.numbers:
             value, per_cube = _value_and_slope(hypothesis, i)
-            size = max(abs(value), UNSEEN * per_cube * before[i])
+            size = max(abs(value), NINETY_FIVE * per_cube * before[i])
             found.append(size / (per_cube * after[i]))
         return found
 
@@ -220,7 +220,7 @@ def _steps(cube: np.ndarray, normal: np.ndarray, slope: np.ndarray) -> np.ndarra
     return np.clip(cube - np.array(moves), 0.0, 1.0)
 
 
-def _experiment(trial: Trial, fit: Fit, separation: float, *, closed: bool, rivals: bool) -> Experiment:
+def _experiment(trial: SimulatedRun, fit: Fit, separation: float, *, closed: bool, rivals: bool) -> Experiment:
     sentence = how(trial.excitation, fit.hypothesis.model, trial.command, closed=closed)
     repeats = int(np.ceil((DECISIVE / max(separation, 1e-6)) ** 2)) if rivals else 1
     if 1 < repeats <= MOST_REPEATS:

@@ -22,7 +22,7 @@ EVENT = "geometry/payload_event"
 
 
 @dataclass(frozen=True)
-class Trial:
+class SimulatedRun:
     """An excitation that the robot stands, and what it would leave.
 
     Attributes:
@@ -63,7 +63,7 @@ class Bench:
         """The completed model."""
         return self.hypothesis.model
 
-    def tried(self, excitation: Excitation, rng: np.random.Generator) -> Trial | None:
+    def tried(self, excitation: Excitation, rng: np.random.Generator) -> SimulatedRun | None:
         """The excitation at the largest size that keeps within the robot's reach; None where there is none."""
         noise = self._noise(rng)
         aimed = self._aimed(excitation, noise)
@@ -71,7 +71,7 @@ class Bench:
             recording = self._recorded(aimed, noise)
             command = float(np.abs(recording.stack(self.model.plant.commands)).max())
             if self._within_reach(recording, command):
-                return Trial(aimed, recording, command)
+                return SimulatedRun(aimed, recording, command)
             if not aimed.shrinks:
                 break
             aimed = replace(aimed, size=0.5 * aimed.size, tilt=0.5 * aimed.tilt)

@@ -23,7 +23,7 @@ from wipx.sim.cache import cached
 ENDS = (0.005, 0.995)  # quantiles of a signal between which its knots lie
 FREQUENCIES = np.geomspace(0.5, 16.0, 12)  # [Hz] of resonances that are looked for
 DAMPING = 0.05  # ratio, of the same
-RIDGE = 1e-9
+REGULARISATION = 1e-9
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _tested(
     slopes = slopes - basis @ (basis.T @ slopes)
     size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
     scaled = slopes / size
-    normal = scaled.T @ scaled + RIDGE * np.eye(len(size))
+    normal = scaled.T @ scaled + REGULARISATION * np.eye(len(size))
     score = scaled.T @ left
     force = np.linalg.solve(normal, score)
     gain = 0.5 * float(score @ force)

@@ -24,7 +24,7 @@ SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbo
 INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
 HARDLY = 0.1  # of a joint's travel, bent by which a bristle hardly slips
 BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
-CERTAIN = 2.0  # standard deviations
+CERTAIN_PEAK = 2.0  # standard deviations
 ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
 
 
@@ -129,7 +129,7 @@ def _peak_is_certain(effect: str, fit: Fit, data: RecordingBatch) -> bool:
     slope = np.zeros(len(cube))
     slope[[static, level]] = size[static], -size[level]
     peak = float(slope @ cube)
-    return peak > CERTAIN * float(np.sqrt(slope @ covariance(fit) @ slope))
+    return peak > CERTAIN_PEAK * float(np.sqrt(slope @ covariance(fit) @ slope))
 
 
 def _top_speed(data: RecordingBatch) -> float:

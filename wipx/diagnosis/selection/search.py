@@ -25,7 +25,7 @@ STICKING_SHARE = 0.05  # that bristles gain by how a joint comes to rest, where 
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
-POLISHED = 3  # effects for which they are, at most
+FITTED_TO_THE_END = 3  # effects for which they are, at most
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 WORTH_PAIRING = 4.0  # nats that they must gain alone
@@ -320,7 +320,7 @@ class Selection:
         gains = [self.evidence(fit, f) for f in fits]
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
-            close = gain >= CLOSE * max(gains) and i < POLISHED
+            close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
             polished.append(self.fitter.polished(found) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])

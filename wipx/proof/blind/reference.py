@@ -11,6 +11,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
+from wipx.core.results import HORIZON
 from wipx.identify.noise import sensor_noise
 from wipx.identify.objectives import FitData, Windowed
 from wipx.identify.optimizers.least_squares import LeastSquares
@@ -18,7 +19,6 @@ from wipx.identify.parameter_space import parameter_space, scales_of
 from wipx.identify.problem import WindowProblem
 from wipx.sim.simulator import Simulator
 
-HORIZON = 0.5  # [s], contract section 4
 SEARCH = LeastSquares(starts=1, smoothing=(0.03, 0.003, 0.0), seconds=120.0)  # the true values are near the minimum
 
 

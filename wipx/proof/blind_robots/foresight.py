@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.core.results import HORIZON
 from wipx.proof.blind_robots.compiled import kept
 from wipx.proof.blind_robots.engine import STATES, interval
 from wipx.proof.blind_robots.logging import Course
 from wipx.proof.blind_robots.scenario import Scenario
-
-HORIZON = 0.5  # [s], contract section 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ import numpy as np
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.model import Model
 from wipx.core.recording import Recording, RecordingSplit
-from wipx.diagnosis.decision.context import HORIZON
+from wipx.core.results import HORIZON
 from wipx.identify.identification import Request, identify
 from wipx.library import feedback_of
 from wipx.proof.baseline_answers import MethodAnswer, ask, check_methods

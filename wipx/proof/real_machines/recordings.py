@@ -17,8 +17,8 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.model import Model
 from wipx.core.recording import Recording, RecordingSplit
+from wipx.core.results import HORIZON
 from wipx.diagnosis.answer.suspects import check_suspects
-from wipx.diagnosis.decision.context import HORIZON
 from wipx.identify.parameter_space import scales_of
 from wipx.proof.baseline_answers import MethodAnswer, ask, check_methods
 from wipx.proof.real_machines.group_results import OURS, answer_of
@@ -33,7 +33,7 @@ from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)
-class Case:
+class Rig:
     """One diagnosis.
 
     Attributes:
@@ -69,7 +69,7 @@ class Prepared:
         authors: The authors' full model; None where they published none.
     """
 
-    case: Case
+    case: Rig
     source: RecordingSource
     split: RecordingSplit
     published: Published
@@ -122,7 +122,7 @@ class RealRecordings:
     def _prepared(self, job: Job) -> dict[str, Prepared]:
         """Every dataset, read before the first diagnosis, so that a missing one is reported at once."""
         cases = {
-            name: job.build({"_target_": f"{Case.__module__}.Case", **settings}, f"task.cases.{name}")
+            name: job.build({"_target_": f"{Rig.__module__}.Rig", **settings}, f"task.cases.{name}")
             for name, settings in self.cases.items()
             if not self.only or name in self.only
         }

@@ -18,7 +18,7 @@ EARLY = 0.05  # [s] before the end of a trial at which a recording that ends was
 
 
 @dataclass(frozen=True)
-class Judge:
+class TrialJudge:
     """What counts.
 
     Attributes:
