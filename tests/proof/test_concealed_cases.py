@@ -19,11 +19,11 @@ from wipx.proof.blind_robots.cases import (
     stratified,
 )
 from wipx.proof.blind_robots.logging import record
-from wipx.proof.blind_robots.oddities import draw_oddity, oddity_names
 from wipx.proof.blind_robots.physics import Hidden, physics
 from wipx.proof.blind_robots.robots import draw_robot, linearised
 from wipx.proof.blind_robots.scenario import draw_log_settings, draw_scenario
 from wipx.proof.blind_robots.sizes import Draw, consequences, draw_details, draw_values, effect_names
+from wipx.proof.blind_robots.unmodelled_physics import draw_oddity, oddity_names
 from wipx.proof.blind_robots.write import case_files, write_files
 from wipx.recordings.source import RecordingSource
 

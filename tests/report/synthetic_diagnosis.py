@@ -39,13 +39,13 @@ NOTHING_LEFT = Unexplained(False, 0.31, None, "", (), None)
 RUNS = ("r3.csv", "r1.csv", "r2.csv", "r4.csv")
 
 
-def law_curve(title: str = "force on the rail joint") -> Curve:
+def law_curve() -> Curve:
     """Coulomb friction over the wheel's speed, as noisy bins see it."""
     rng = np.random.default_rng(1)
     at, bins = np.linspace(-0.8, 0.8, 161), np.linspace(-0.76, 0.76, 20)
     spread = 0.08 + 0.35 * np.abs(bins) ** 3
     force = -3.1 * np.sign(bins) + rng.normal(0.0, spread)
-    return Curve(title, "x_dot", "m/s", "N", at, -3.1 * np.sign(at), bins, force, spread)
+    return Curve("force", "x_dot", "m/s", "N", at, -3.1 * np.sign(at), bins, force, spread)
 
 
 def error_map() -> ErrorMap:
@@ -213,7 +213,7 @@ def unexplained() -> Diagnosis:
     x = np.linspace(-0.5, 0.5, 41)
     shape = 0.8 * np.sin(9.0 * x) * np.exp(-((x / 0.3) ** 2))
     bins = x[::3]
-    curve = Curve("force on the rail joint", "x", "m", "N", x, shape, bins, shape[::3] + 0.03, np.full(len(bins), 0.06))
+    curve = Curve("force", "x", "m", "N", x, shape, bins, shape[::3] + 0.03, np.full(len(bins), 0.06))
     return replace(
         whole,
         verdict="unexplained",

@@ -17,7 +17,7 @@ class Curve:
     """A force over one signal, with what the recordings themselves say of it.
 
     Attributes:
-        title: What it shows, e.g. "force on the wheel/rail joint".
+        quantity: What the ordinate shows, in a word or two, e.g. "torque".
         signal: Column or rate on the abscissa, e.g. "x_dot".
         signal_unit: Its SI unit.
         force_unit: SI unit of the ordinate.
@@ -28,7 +28,7 @@ class Curve:
         spread: Standard error of each mean, shape (B,).
     """
 
-    title: str
+    quantity: str
     signal: str
     signal_unit: str
     force_unit: str

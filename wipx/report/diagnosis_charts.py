@@ -144,7 +144,7 @@ def _curve(titled: TitledCurve) -> dict:
         "standIn": titled.stand_in,
         "signal": curve.signal,
         "signalUnit": curve.signal_unit,
-        "force": curve.title,
+        "force": curve.quantity,
         "forceUnit": curve.force_unit,
         "at": _numbers(curve.at),
         "law": _numbers(curve.law),

@@ -91,7 +91,7 @@ def _draw_curve(axes: Axes, titled: TitledCurve) -> None:
     axes.plot(curve.at, curve.law, color=colour, linewidth=2.0, label=label)
     axes.set_ylim(*force_range(curve))
     axes.set_xlabel(with_unit(curve.signal, curve.signal_unit), color=MUTED, parse_math=False)
-    axes.set_ylabel(with_unit(curve.title, curve.force_unit), color=MUTED, parse_math=False)
+    axes.set_ylabel(with_unit(curve.quantity, curve.force_unit), color=MUTED, parse_math=False)
     axes.set_title(titled.title, loc="left", fontsize=10, color=MUTED, parse_math=False)
     axes.legend(frameon=False, fontsize=9)
 

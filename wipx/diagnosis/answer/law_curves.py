@@ -5,7 +5,6 @@ import numpy as np
 from wipx.core.diagnosis import Curve
 from wipx.core.effect import Steady
 from wipx.core.model import Model
-from wipx.core.words import effect_in_words
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.residuals.discrepancy import process_mean
@@ -28,14 +27,15 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
     shape = next((s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (joint, signal)), None)
     if shape is None:
         return None
-    at = np.unique(np.concatenate([np.linspace(shape.knots[0], shape.knots[-1], POINTS), [-1e-9, 1e-9]]))
+    at = _abscissa(shape.knots[0], shape.knots[-1])
     left = residual_tests(fitter, reduced, [shape])[0]
     force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
+    quantity, unit = ("torque", "N m") if plant.is_angular(plant.joints[joint]) else ("force", "N")
     return Curve(
-        effect_in_words(effect, plant.kind),
+        quantity,
         shape.signal,
         plant.unit_of(shape.signal),
-        "N m" if plant.is_angular(plant.joints[joint]) else "N",
+        unit,
         at,
         added_force(completed.hypothesis.model, effect, at),
         shape.knots,
@@ -51,6 +51,12 @@ def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
     if steady.over == "coordinate":
         return plant.coordinates[joint]
     return plant.commands[0 if len(plant.commands) == 1 else joint]
+
+
+def _abscissa(low: float, high: float) -> np.ndarray:
+    """Points between two ends, with those just beside zero, where dry friction jumps."""
+    at = np.linspace(low, high, POINTS)
+    return np.unique(np.concatenate([at, [-1e-9, 1e-9]])) if low < 0.0 < high else at
 
 
 def added_force(model: Model, effect: str, at: np.ndarray) -> np.ndarray:

@@ -92,9 +92,9 @@ def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, data: RecordingBatch) -
     values = fit.hypothesis.model.effects[f"{site}/remainder"]
     force = np.array([values[f"f{i}"] for i in range(KNOTS)])
     unit = "share of u" if shape.kind == "gain" else "N m" if plant.is_angular(site) else "N"
-    words = {"gain": "change of the actuator gain", "friction": "change of dry friction", "force": "unknown force"}
+    quantity = {"gain": "change of gain", "friction": "change of friction", "force": "unknown force"}[shape.kind]
     return Curve(
-        f"{words[shape.kind]} on {site}",
+        quantity,
         shape.signal,
         "s" if shape.signal == "t" else plant.unit_of(shape.signal),
         unit,

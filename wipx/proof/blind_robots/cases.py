@@ -8,7 +8,6 @@ import numpy as np
 
 from wipx.core.plant import PLANTS
 from wipx.proof.blind_robots.logging import Run, record
-from wipx.proof.blind_robots.oddities import draw_oddity, oddity_names
 from wipx.proof.blind_robots.physics import DRIVEN, MOVING, Hidden, physics
 from wipx.proof.blind_robots.robots import Robot, draw_robot
 from wipx.proof.blind_robots.scenario import (
@@ -21,6 +20,7 @@ from wipx.proof.blind_robots.scenario import (
     draw_scenario,
 )
 from wipx.proof.blind_robots.sizes import Draw, consequences, draw_details, draw_values, effect_names, families
+from wipx.proof.blind_robots.unmodelled_physics import draw_oddity, oddity_names
 
 TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hold 120 chances of a false alarm
     "nothing": 0.40,
