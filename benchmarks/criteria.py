@@ -48,7 +48,7 @@ class HalfSecond(ForecastFitter):
 class NotHeldOut(ForecastFitter):
     """All horizons; evidence is that of the recordings that were fitted, with the penalty of the sandwich."""
 
-    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+    def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance."""
         return LEAST_GAIN
 
@@ -97,7 +97,7 @@ class Case:
 def by_forecasts(kind: type[ForecastFitter], context: Context, setting: Setting) -> ForecastFitter:
     """Forecasts beside the noise that innovations find for the nominal model."""
     by_row = context.by_row
-    seen = by_row.polished(by_row.fit(Hypothesis.of(context.setting, (), {}), context.first_levels))
+    seen = by_row.converged(by_row.fit(Hypothesis.of(context.setting, (), {}), context.first_levels))
     return kind(by_row, context.first_levels, seen.levels, setting)
 
 
@@ -149,22 +149,22 @@ def searched(context: Context, fitter: Fitter) -> tuple[str, ...]:
     """Effects that a search by one criterion ends with."""
     start = Hypothesis.of(context.setting, (), {})
     if isinstance(fitter, ForecastFitter):
-        nominal = fitter.begun(start)
+        nominal = fitter.first_fit(start)
     else:
-        nominal = fitter.polished(fitter.fit(start, context.first_levels))
+        nominal = fitter.converged(fitter.fit(start, context.first_levels))
     return Selection(fitter, context.setting, nominal).run().effects
 
 
 def refitted(context: Context, effects: tuple[str, ...]) -> Model:
     """The nominal model with effects, fitted to forecasts from where screening has the best of each in turn."""
     fitter = by_forecasts(ForecastFitter, context, context.setting)
-    fit = fitter.begun(Hypothesis.of(context.setting, (), {}))
+    fit = fitter.first_fit(Hypothesis.of(context.setting, (), {}))
     search = Selection(fitter, context.setting, fit)
     for effect in effects:
         starts = [each for each in search.candidates_for(fit) if each.effect == effect]
         values = {**fit.hypothesis.values, **(starts[0].values if starts else {})}
         begun = Hypothesis.of(context.setting, (*fit.effects, effect), values)
-        fit = fitter.polished(fitter.fit(begun, fit.levels))
+        fit = fitter.converged(fitter.fit(begun, fit.levels))
     return fit.hypothesis.model
 
 

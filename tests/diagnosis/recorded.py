@@ -61,7 +61,7 @@ class Bench:
 
     def fit(self, *effects: str) -> Fit:
         """These effects fitted from their usual values on."""
-        return self.fitter.polished(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), self.quiet))
+        return self.fitter.converged(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), self.quiet))
 
     def diagnosed(self, suspects: Mapping[str, Mapping[str, float]] | None = None) -> Diagnosis:
         """The answer, asked about suspects."""

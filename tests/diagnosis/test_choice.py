@@ -44,7 +44,7 @@ class Case:
     def fitted(self, effects: tuple[str, ...]) -> Fit:
         force = np.array([1e-4 * self.setting.scales[site].force for site in self.nominal.plant.joints])
         levels = NoiseLevels(force, sensor_noise(self.recordings, self.nominal.plant))
-        return self.fitter.polished(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), levels))
+        return self.fitter.converged(self.fitter.fit(Hypothesis.of(self.setting, effects, {}), levels))
 
     def ask(self, *rivals: Fit, parameters: tuple[str, ...] = (), closed: bool = True) -> NextExperiment | None:
         feedback = controller(self.nominal.plant.kind) if closed else None

@@ -70,6 +70,6 @@ def test_one_effect_takes_the_place_of_two_that_imitate_it(fresh_seed: int):
     selection = Selection(case.fitter, case.setting, case.fit())
     rescaled = {"sensor_x/scale.e": -0.06, "actuator/gain.k": 1.06}  # a linear robot looks the same at another scale
     hypothesis = Hypothesis.of(case.setting, ("sensor_x/scale", "actuator/gain"), rescaled)
-    two = case.fitter.polished(case.fitter.fit(hypothesis, selection.nominal.levels))
+    two = case.fitter.converged(case.fitter.fit(hypothesis, selection.nominal.levels))
     assert selection.evidence(selection.nominal, two) > 100.0
     assert selection.exchanged(two).effects == ("sensor_theta/scale",)

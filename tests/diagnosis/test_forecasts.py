@@ -35,7 +35,7 @@ def shaken(case: Bench, rng: np.random.Generator) -> Bench:
 def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
-    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
     found = Selection(fitter, case.setting, nominal).run()
     assert found.effects[0].startswith("translation/")
     level = next(v for name, v in found.hypothesis.values.items() if name.endswith((".F_c", ".F_s")))
@@ -45,7 +45,7 @@ def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
 def test_nothing_is_asked_for_where_the_nominal_model_is_right(fresh_seed: int):
     case = bench("linear_axis", {}, fresh_seed, count=3)
     fitter = forecasts(case)
-    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
     assert Selection(fitter, case.setting, nominal).run().effects == ()
 
 
@@ -54,17 +54,17 @@ def test_a_mass_that_is_slightly_wrong_is_no_missing_law(fresh_seed: int):
     believed = case.nominal.with_values({"body_mass": 1.02 * case.nominal.value("body_mass")})
     case = replace(shaken(case, np.random.default_rng(fresh_seed)), nominal=believed)
     fitter = forecasts(case)
-    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
-    heavier = fitter.begun(Hypothesis.of(case.setting, ("geometry/payload",), {}))
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    heavier = fitter.first_fit(Hypothesis.of(case.setting, ("geometry/payload",), {}))
     assert not fitter.holds(nominal, heavier)
 
 
 def test_friction_holds_beside_numbers_in_doubt_and_what_is_not_there_does_not(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
-    nominal = fitter.begun(Hypothesis.of(case.setting, (), {}))
-    friction = fitter.begun(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
-    spring = fitter.polished(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    spring = fitter.converged(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
     assert fitter.holds(nominal, friction)
     assert not fitter.holds(friction, nominal)
     assert not fitter.holds(friction, spring)
@@ -73,7 +73,7 @@ def test_friction_holds_beside_numbers_in_doubt_and_what_is_not_there_does_not(f
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):
     hidden = {"sensor_theta/delay": {"tau": 0.015}}
     case = bench("pendulum", hidden, fresh_seed, count=3)
-    late = forecasts(case).begun(Hypothesis.of(case.setting, ("sensor_theta/delay",), {}))
+    late = forecasts(case).first_fit(Hypothesis.of(case.setting, ("sensor_theta/delay",), {}))
     assert late.hypothesis.values["sensor_theta/delay.tau"] == pytest.approx(0.015, rel=0.05)
 
 
@@ -81,7 +81,7 @@ def test_two_laws_of_one_equation_are_not_told_apart_and_friction_is_from_a_spri
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
     friction, rich, spring = (
-        fitter.begun(Hypothesis.of(case.setting, (effect,), {}))
+        fitter.first_fit(Hypothesis.of(case.setting, (effect,), {}))
         for effect in ("translation/coulomb", "translation/presliding", "environment/spring")
     )
     assert _separation(fitter, friction, rich) < ALIKE
@@ -99,7 +99,7 @@ def _with(case: Bench, fit: Fit, effect: str) -> Hypothesis:
 def test_half_the_squares_of_white_errors_are_the_loss_of_likelihood(fresh_seed: int):
     case = bench("pendulum", {"pitch/coulomb": {"F_c": 0.1}}, fresh_seed)
     fitter = forecasts(case)
-    fit = fitter.begun(Hypothesis.of(case.setting, ("pitch/viscous",), {}))
+    fit = fitter.first_fit(Hypothesis.of(case.setting, ("pitch/viscous",), {}))
     apart = fitter.by_recording(fit, fit.white)
     assert apart.sum() == pytest.approx(fit.log_likelihood, abs=0.5)
     np.testing.assert_allclose(fitter.white_of(fit, ModelBatch(fit.hypothesis.model))[0], fit.white.ravel(), atol=1e-9)
@@ -110,7 +110,7 @@ def test_a_recording_that_is_left_out_does_not_count(fresh_seed: int):
     fitter = forecasts(case)
     others = fitter.without(0)
     assert others.rows < fitter.rows
-    fit = others.begun(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    fit = others.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
     assert others.by_recording(fit, fit.white)[0] == 0.0
 
 

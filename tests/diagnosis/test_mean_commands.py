@@ -44,7 +44,7 @@ def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, f
     nominal = nominal_model("linear_axis").with_effects({"environment/spring": SPRING})
     case = Bench(nominal, noisily_driven(effect, fresh_seed), {})
     truth = {f"{effect}.{symbol}": value for symbol, value in LIMITS[effect].items()}
-    fit = case.fitter.polished(case.fitter.fit(Hypothesis.of(case.setting, (effect,), truth), case.quiet))
+    fit = case.fitter.converged(case.fitter.fit(Hypothesis.of(case.setting, (effect,), truth), case.quiet))
     for name, value in truth.items():
         assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.08)
     # Three commands a row: their spread about the mean is known from how the means scatter.
@@ -57,7 +57,7 @@ def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, f
 def test_a_dead_zone_is_looked_for_with_commands_that_scatter(fresh_seed: int):
     nominal = nominal_model("linear_axis").with_effects({"environment/spring": SPRING})
     case = Bench(nominal, noisily_driven("actuator/dead_zone", fresh_seed), {})
-    fit = case.fitter.polished(case.fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet))
+    fit = case.fitter.converged(case.fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet))
     starts = candidates_of_effect(case.fitter, case.setting, fit, "actuator/dead_zone")
     best = max(starts, key=lambda start: start.gain)
     # Taken for the commands themselves, their means would give little more than half of it.

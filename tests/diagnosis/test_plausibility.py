@@ -60,7 +60,7 @@ def checked(model: Model, recordings: Recordings, effects: tuple[str, ...] = ())
 
 
 def fitted(fitter: InnovationFitter, setting: Setting, effects: tuple[str, ...], levels: NoiseLevels) -> Fit:
-    return fitter.polished(fitter.fit(Hypothesis.of(setting, effects, {}), levels), rounds=2)
+    return fitter.converged(fitter.fit(Hypothesis.of(setting, effects, {}), levels), rounds=2)
 
 
 def with_slip(mistake: Mistake, model: Model, recordings: Recordings) -> tuple[Model, Recordings]:

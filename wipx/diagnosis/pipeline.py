@@ -94,7 +94,7 @@ def diagnose(
     context = Context.of(halves, setting, simulator)
     watcher("noise of the nominal model", 0.02)
     fitter = context.by_row
-    nominal = fitter.polished(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
+    nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
     selection = Selection(fitter, setting, nominal, context.transfers)
     watcher("looking for missing effects", 0.1)
     first = selection.extensions(nominal)

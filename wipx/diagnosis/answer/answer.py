@@ -166,7 +166,7 @@ def _rivals(context: Context, selection: Selection, fit: Fit, effect: str) -> tu
             context.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
         )
         if close or start is not starts[0]:
-            again = context.fitter.polished(context.fitter.fit(start, fit.levels))
+            again = context.fitter.converged(context.fitter.fit(start, fit.levels))
             other = max(other, again, key=lambda found: found.log_likelihood)
         loss = selection.evidence(base, fit) - selection.evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}

@@ -24,7 +24,7 @@ def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined
             rest = tuple(effect for effect in fit.effects if effect not in (friction, constant))
             start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
             hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
-            other = context.fitter.polished(context.fitter.fit(hypothesis, context.fitter.loosened(fit)))
+            other = context.fitter.converged(context.fitter.fit(hypothesis, context.fitter.escape_levels(fit)))
             lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
             if lead > -TOLD_APART:
                 values = other.hypothesis.values

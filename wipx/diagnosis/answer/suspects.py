@@ -113,8 +113,8 @@ class _Asked:
         gone = (self.name,) if named else replaced
         base = context.reduced(selection, self.rest.fit, *gone) if gone else self.rest.fit
         free = self.rest.fit if named else self.free_size(base, values)
-        base = self.caught_up(base, free)
-        best = self.caught_up(self.rest.fit, free)
+        base = self.refitted_from(base, free)
+        best = self.refitted_from(self.rest.fit, free)
         repeated = transfer(context.fitter, free)
         known = context.fitter.by_recording(base, base.white)
         numbers = estimates(context.fitter, free, selection.nominal)
@@ -194,18 +194,18 @@ class _Asked:
         curves = self.context.setting_of(rest.fit).nominal.effects
         kept = replace(setting, nominal=setting.nominal.with_effects({**curves, **setting.nominal.effects}))
         fits = [fitter.fit(Hypothesis.of(kept, effects, start), levels, steps=5) for start in starts]
-        best = fitter.polished(max(fits, key=lambda fit: fit.log_likelihood))
+        best = fitter.converged(max(fits, key=lambda fit: fit.log_likelihood))
         if rest.strongest is None or not len(rest.spread):
             return best
         without = fitter.fit(Hypothesis.of(setting, effects, best.hypothesis.values), best.levels)
         anew, _ = with_curve(self.context.by_row, setting, without, rest.strongest)
         return max(best, anew, key=lambda fit: fit.log_likelihood)
 
-    def caught_up(self, fit: Fit, other: Fit) -> Fit:
+    def refitted_from(self, fit: Fit, other: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of another."""
         if fit is other:
             return fit
-        again = self.context.fitter.polished(self.context.fitter.fit(fit.hypothesis, other.levels), rounds=2)
+        again = self.context.fitter.converged(self.context.fitter.fit(fit.hypothesis, other.levels), rounds=2)
         return max(fit, again, key=lambda one: one.log_likelihood)
 
 

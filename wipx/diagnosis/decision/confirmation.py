@@ -151,7 +151,7 @@ def _rival_that_transfers(
     error = context.heldout_error(repeated)
     for other in selection.replacements(fit, effect)[:RIVALS]:
         if set(other.effects) != set(fit.effects) and selection.evidence(other, fit) < GIVEN_UP * gain:
-            again = context.fitter.polished(context.fitter.fit(other.hypothesis, fit.levels))
+            again = context.fitter.converged(context.fitter.fit(other.hypothesis, fit.levels))
             if context.heldout_error(transfer(context.fitter, again)) < (1.0 - VISIBLE) * error:
                 return again
     return None
@@ -231,7 +231,7 @@ def _beyond(context: Context, selection: Selection, fit: Fit, worth: float) -> t
         if candidate.effect not in best:
             values = {**fit.hypothesis.values, **candidate.values}
             hypothesis = Hypothesis.of(context.setting, (*fit.effects, candidate.effect), values)
-            best[candidate.effect] = context.fitter.polished(context.fitter.fit(hypothesis, fit.levels), rounds=2)
+            best[candidate.effect] = context.fitter.converged(context.fitter.fit(hypothesis, fit.levels), rounds=2)
     good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
     ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
     return tuple(ordered), good[ordered[0]] if ordered else None
@@ -246,7 +246,7 @@ def _other_law(context: Context, selection: Selection, fit: Fit, worth: float) -
             effects, starts = law
             begins = [Hypothesis.of(context.setting, effects, start) for start in starts]
             start = context.fitter.likeliest(begins, fit.levels, 1)[0]
-            found = context.fitter.polished(context.fitter.fit(start, fit.levels), rounds=2)
+            found = context.fitter.converged(context.fitter.fit(start, fit.levels), rounds=2)
             gain = selection.evidence(fit, found)
             taken = gain > most
             reason = f"explains {'more' if taken else 'hardly more'} in the place of {effect}"

@@ -124,7 +124,7 @@ class Context:
         if setting is self.setting:
             return selection.fitted(rest, fit) if rest else selection.nominal
         hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
-        return self.fitter.polished(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
 
     def setting_of(self, fit: Fit) -> Setting:
         """The robot, with the stand-in of a fit where it has one."""

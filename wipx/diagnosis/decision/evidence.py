@@ -83,11 +83,11 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     """
     setting = context.setting
     ahead = replace(context, fitter=fitter)
-    nominal = fitter.begun(Hypothesis.of(setting, (), {}))
+    nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
     selection = Selection(fitter, setting, nominal)
     best = selection.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
-    same = selection.pruned(fitter.polished(fitter.fit(start, best.levels))) if chosen.effects else nominal
+    same = selection.pruned(fitter.converged(fitter.fit(start, best.levels))) if chosen.effects else nominal
     if not selection.gains_enough(nominal, same):
         same = nominal
     if set(same.effects) != set(best.effects) and selection.lead(same, best) > 0.0:

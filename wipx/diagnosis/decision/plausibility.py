@@ -291,7 +291,7 @@ class _Case:
 def _polished(fitter: InnovationFitter, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit | None:
     """The best values and noise; None where the model runs away from the recordings."""
     try:
-        fit = fitter.polished(fitter.fit(hypothesis, levels), rounds=ROUNDS)
+        fit = fitter.converged(fitter.fit(hypothesis, levels), rounds=ROUNDS)
     except np.linalg.LinAlgError:
         return None
     return None if _runs_away(fitter, fit) or not np.isfinite(fit.log_likelihood) else fit

@@ -29,7 +29,7 @@ DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
 LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
 ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
-ALTERNATION_ENDS = 0.5  # nats at which alternating ends
+CONVERGED = 0.5  # nats at which alternating ends
 
 
 class Noise(Protocol):
@@ -149,11 +149,11 @@ class Fitter(ABC):
         """Number of the recording to which each white error belongs, shape of `Fit.white`."""
 
     @abstractmethod
-    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+    def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Values, and what is else held fixed, in turn until neither gains more."""
 
     @abstractmethod
-    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+    def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """Evidence that what a fit has beside a smaller one must gain beyond its penalty [nats].
 
         Args:
@@ -188,7 +188,7 @@ class Fitter(ABC):
         """
 
     @abstractmethod
-    def loosened(self, fit: Fit) -> Any:
+    def escape_levels(self, fit: Fit) -> Any:
         """Levels from which a fit sees less of a misfit that it got stuck in."""
 
     @abstractmethod

@@ -23,7 +23,7 @@ from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON
-from wipx.diagnosis.likelihood.fitting import ALTERNATION_ENDS, LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import CONVERGED, LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import NoiseLevels
@@ -56,7 +56,7 @@ TOO_FAR = 5.0  # ranges of the recorded motion; what a prediction that fell over
 
 
 @dataclass(frozen=True)
-class Anchors:
+class PredictionStarts:
     """Where predictions start.
 
     Attributes:
@@ -192,11 +192,11 @@ class ForecastFitter(Fitter):
         """The same with recordings that do not count."""
         return replace(self, by_row=self.by_row.without(*recordings), _doubts={}, _seen={})
 
-    def begun(self, hypothesis: Hypothesis) -> Fit:
+    def first_fit(self, hypothesis: Hypothesis) -> Fit:
         """A first fit of a hypothesis, from starts of its own."""
-        return self.polished(self.fit(hypothesis, self.anchored(hypothesis.model)))
+        return self.converged(self.fit(hypothesis, self.prediction_starts(hypothesis.model)))
 
-    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+    def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """Nothing: `holds` asks."""
         return 0.0
 
@@ -273,11 +273,11 @@ class ForecastFitter(Fitter):
         differences = self._by_stretch(self._likelihoods(fit) - self._likelihoods(rival))
         return float(max(lead, 0.0) / max(np.sqrt(len(differences)) * np.std(differences, ddof=1), 1e-12))
 
-    def loosened(self, fit: Fit) -> Anchors:
+    def escape_levels(self, fit: Fit) -> PredictionStarts:
         """Starts by the fit itself, of the best filter near its own."""
-        return self.anchored(fit.hypothesis.model, self._near(fit))
+        return self.prediction_starts(fit.hypothesis.model, self._near(fit))
 
-    def spread_for(self, model: Model, levels: Anchors) -> Anchors:
+    def spread_for(self, model: Model, levels: PredictionStarts) -> PredictionStarts:
         """The same starts: commands are taken as the log has them."""
         return levels
 
@@ -295,27 +295,27 @@ class ForecastFitter(Fitter):
 
     def seen_ahead(self, fit: Fit) -> Fit:
         """A fit by innovations as its forecasts show it."""
-        return self.fit(fit.hypothesis, self.anchored(fit.hypothesis.model), steps=0)
+        return self.fit(fit.hypothesis, self.prediction_starts(fit.hypothesis.model), steps=0)
 
-    def anchored(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> Anchors:
+    def prediction_starts(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> PredictionStarts:
         """Starts by the model, of the filter from which its predictions are likeliest."""
         tried = list(bandwidths) if bandwidths is not None else [np.full(self.data.joints, b) for b in BANDWIDTHS]
         filters = [self._smoother.filtered(model, bandwidth, leads_of(self.windows)) for bandwidth in tried]
         if len(tried) == 1:
-            return Anchors(tried[0], filters[0])
+            return PredictionStarts(tried[0], filters[0])
         errors = self._errors_from(ModelBatch(model, (), np.zeros((len(tried), 0))), filters)
         best = int(np.argmax([each.log_likelihood for each in self.noise_of(errors, None, model)]))
-        return Anchors(tried[best], filters[best])
+        return PredictionStarts(tried[best], filters[best])
 
     @cached_property
     def _smoother(self) -> Smoother:
         return Smoother(self.simulator, self.data.plant, self._recordings, self.noise)
 
-    def polished(self, fit: Fit, *, rounds: int = 2) -> Fit:
+    def converged(self, fit: Fit, *, rounds: int = 2) -> Fit:
         """Starts and values in turn until neither gains more."""
         for _ in range(rounds):
-            again = self.fit(fit.hypothesis, self.anchored(fit.hypothesis.model, [fit.levels.bandwidths]))
-            if again.log_likelihood < fit.log_likelihood + ALTERNATION_ENDS:
+            again = self.fit(fit.hypothesis, self.prediction_starts(fit.hypothesis.model, [fit.levels.bandwidths]))
+            if again.log_likelihood < fit.log_likelihood + CONVERGED:
                 return max(fit, again, key=lambda each: each.log_likelihood)
             fit = again
         return fit
@@ -326,7 +326,7 @@ class ForecastFitter(Fitter):
         near = best * np.array(list(product((1.0 / 3.0, 1.0, 3.0), repeat=len(best))))
         return list(np.unique(np.clip(near, BANDWIDTHS[0], BANDWIDTHS[-1]), axis=0))
 
-    def errors_of(self, batch: ModelBatch, levels: Anchors, model: Model) -> np.ndarray:
+    def errors_of(self, batch: ModelBatch, levels: PredictionStarts, model: Model) -> np.ndarray:
         """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
         return self._errors_from(batch, [levels.filter])
 
@@ -354,7 +354,7 @@ class ForecastFitter(Fitter):
         rows = np.moveaxis(self.windows.recorded, 1, 0)[:, self.windows.predicted]
         return TOO_FAR * np.ptp(rows, axis=1) + 1e3 * self.noise
 
-    def noise_of(self, errors: np.ndarray, levels: Anchors | None, model: Model) -> list[Errors]:
+    def noise_of(self, errors: np.ndarray, levels: PredictionStarts | None, model: Model) -> list[Errors]:
         """How each model's errors are distributed, by expectation and maximisation."""
         some = errors[:, self._counted]
         count, size = some.shape[1:]

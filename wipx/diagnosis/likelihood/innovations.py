@@ -12,7 +12,7 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import ALTERNATION_ENDS, LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import CONVERGED, LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, whitened
@@ -84,7 +84,7 @@ class InnovationFitter(Fitter):
         """The same with recordings that do not count."""
         return InnovationFitter(replace(self.innovations_model, data=replace(self.data, left_out=recordings)))
 
-    def asked(self, smaller: Fit, larger: Fit, explained: float) -> float:
+    def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
         share = nonsmooth_search.SHARE if nonsmooth_search.leaves_open(smaller, added) else LEAST_SHARE
@@ -102,7 +102,7 @@ class InnovationFitter(Fitter):
         """As if one number more made the difference: a likelihood ratio."""
         return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
 
-    def loosened(self, fit: Fit) -> NoiseLevels:
+    def escape_levels(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
         return replace(fit.levels, force=LOUDER * fit.levels.force)
 
@@ -138,12 +138,12 @@ class InnovationFitter(Fitter):
         """White innovations, shape (P, R, m, K + 1)."""
         return whitened(errors, noise, self.data)
 
-    def polished(self, fit: Fit, *, rounds: int = 4) -> Fit:
+    def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
         for _ in range(rounds):
             before = fit.log_likelihood
             fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
-            if fit.log_likelihood - before < ALTERNATION_ENDS:
+            if fit.log_likelihood - before < CONVERGED:
                 break
         return fit
 

@@ -67,7 +67,7 @@ def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, residual: R
         if found.log_likelihood < current.log_likelihood + 0.5:
             break
         current = found
-    return fitter.polished(current, rounds=2), spread
+    return fitter.converged(current, rounds=2), spread
 
 
 def with_force(

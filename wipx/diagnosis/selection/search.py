@@ -33,7 +33,7 @@ EXCHANGES = 3  # rounds at most
 LEAST_LEAD = 4.0  # nats by which a replacement must be better, and a rich law than the simple one that it contains
 
 
-def taken_for_granted(smaller: Fit, larger: Fit) -> bool:
+def always_transfers(smaller: Fit, larger: Fit) -> bool:
     """A transfer that nobody checks."""
     return True
 
@@ -53,7 +53,7 @@ class Selection:
     fitter: Fitter
     setting: Setting
     nominal: Fit
-    transfers: Callable[[Fit, Fit], bool] = taken_for_granted
+    transfers: Callable[[Fit, Fit], bool] = always_transfers
     considered: list[ConsideredEffect] = field(default_factory=list)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Selection:
             extended = self.extensions(current)
             best = self.preferred(extended, current)
             if best is not None:
-                current = self.caught_up(current, best)
+                current = self.refitted_from(current, best)
                 best = self._worth_it(current, [best, *(found for found in extended if found is not best)])
             if best is None:
                 self._remember(current, extended, None)
@@ -78,11 +78,11 @@ class Selection:
                 added = [effect for effect in best.effects if effect not in current.effects]
                 gain = self.evidence(current, best)
                 self.considered.append(ConsideredEffect(" + ".join(added), gain, True, "explain most together"))
-                current = self.pruned(self.settled(best))
+                current = self.pruned(self.restarted(best))
                 continue
             told = len(self.considered)
             self._remember(current, extended, best)
-            pruned = self.pruned(self.settled(best))
+            pruned = self.pruned(self.restarted(best))
             if len(pruned.effects) == len(current.effects) and self.lead(pruned, current) < LEAST_LEAD:
                 del self.considered[told:]
                 reason = "hardly better in the place of one that is there"
@@ -119,7 +119,7 @@ class Selection:
         penalty = 0.5 * len(indices) * np.log(larger.rows)
         explained = max(self.evidence(self.nominal, smaller), 0.0)
         overstated = inflation(larger, indices)
-        return float(overstated * (penalty + self.fitter.asked(smaller, larger, explained)))
+        return float(overstated * (penalty + self.fitter.required_beyond_penalty(smaller, larger, explained)))
 
     def extensions(self, fit: Fit) -> list[Fit]:
         """Fits with one effect more, the best first."""
@@ -165,7 +165,7 @@ class Selection:
             self._candidates[id(fit)] = (fit, candidates_beside(self.fitter, self.setting, fit))
         return self._candidates[id(fit)][1]
 
-    def caught_up(self, fit: Fit, larger: Fit) -> Fit:
+    def refitted_from(self, fit: Fit, larger: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of a larger fit.
 
         A search over noise levels that stopped early would credit the next effect with finishing it.
@@ -173,35 +173,37 @@ class Selection:
         again = self.fitter.fit(fit.hypothesis, larger.levels)
         if again.log_likelihood < fit.log_likelihood + 1.0:
             return fit
-        again = self.fitter.polished(again)
+        again = self.fitter.converged(again)
         if not fit.effects:
             self.nominal = again
         self._fits[frozenset(fit.effects)] = again
         return again
 
-    def settled(self, fit: Fit) -> Fit:
+    def restarted(self, fit: Fit) -> Fit:
         """A fit, or a better one of the same effects that another search leads to.
 
         Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother. Where the
         likelihood of an effect has many peaks, the highest may be another one beside further effects.
         """
-        found = [self.fitter.polished(self.fitter.fit(fit.hypothesis, self.fitter.loosened(fit)))]
+        found = [self.fitter.converged(self.fitter.fit(fit.hypothesis, self.fitter.escape_levels(fit)))]
         moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         if moved is not fit:
-            found.append(self.fitter.polished(moved))
+            found.append(self.fitter.converged(moved))
         if len(fit.effects) > 1:
-            found += [self._begun_anew(fit, effect) for effect in fit.effects if effect.partition("/")[2] in SCANS]
+            found += [
+                self._restarted_without(fit, effect) for effect in fit.effects if effect.partition("/")[2] in SCANS
+            ]
         again = max(found, key=lambda each: each.log_likelihood)
         if again.log_likelihood < fit.log_likelihood + 1.0:
             return fit
         self._fits[frozenset(fit.effects)] = again
         return again
 
-    def _begun_anew(self, fit: Fit, effect: str) -> Fit:
+    def _restarted_without(self, fit: Fit, effect: str) -> Fit:
         """A fit of the same effects, for which one of them starts from where the others leave it room."""
         base = self.without(fit, effect)
         starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
-        return self.fitter.polished(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
+        return self.fitter.converged(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
 
     def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
         """The fit with the most evidence beyond a base, or a simpler one that is as good."""
@@ -221,7 +223,7 @@ class Selection:
                 return plain
         parts = effects_in_parts(best, self.fitter.data)
         if parts is not None:
-            found = self.settled(self.fitted(parts, best))
+            found = self.restarted(self.fitted(parts, best))
             best = found if self.score(found, base) > self.score(best, base) else best
         return best
 
@@ -231,7 +233,7 @@ class Selection:
         if key not in self._fits:
             values = {**reduced_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
-            self._fits[key] = self.fitter.polished(self.fitter.fit(hypothesis, start.levels))
+            self._fits[key] = self.fitter.converged(self.fitter.fit(hypothesis, start.levels))
         return self._fits[key]
 
     def pruned(self, fit: Fit) -> Fit:
@@ -252,7 +254,7 @@ class Selection:
         """A fit, or a better one of the same effects that a search by trial leads to."""
         moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         if moved is not fit:
-            moved = self._fits[frozenset(fit.effects)] = self.fitter.polished(moved)
+            moved = self._fits[frozenset(fit.effects)] = self.fitter.converged(moved)
         return moved
 
     def exchanged(self, fit: Fit) -> Fit:
@@ -269,7 +271,7 @@ class Selection:
             if best is fit:
                 break
             self._fits[frozenset(best.effects)] = best
-            fit = self.pruned(self.settled(best))
+            fit = self.pruned(self.restarted(best))
         return fit
 
     def _with_fewer(self, fit: Fit) -> Fit:
@@ -321,7 +323,7 @@ class Selection:
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
             close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
-            polished.append(self.fitter.polished(found) if close else found)
+            polished.append(self.fitter.converged(found) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -self.score(f, fit))
