@@ -181,3 +181,8 @@ def test_steps_take_the_command_where_it_is_aimed():
     trial = bench.tried(steps, rng)
     assert trial is not None
     assert trial.command == pytest.approx(0.9 * reach.command, rel=0.1)  # the loop is linear but for its noise
+
+
+def test_commands_that_never_came_are_not_scaled():
+    phases = np.random.default_rng(0)
+    assert excitations_for(nominal_model("pendulum"), Reach(np.array([0.3]), 0.0), phases, closed=False) == ()

@@ -3,6 +3,8 @@
 from wipx.core.diagnosis import Diagnosis, FoundEffect
 from wipx.core.results import FitErrors
 from wipx.core.words import effect_in_words
+from wipx.report.diagnosis_words import percent
+from wipx.report.numbers import compact
 
 NEARLY = 1.3  # times the noise floor, errors up to which are told as being at it
 
@@ -19,16 +21,16 @@ def sentence(diagnosis: Diagnosis) -> str:
     if not parts:
         return f"No effect of the vocabulary explains what is missing: {stays}."
     share = diagnosis.held_out.explained_share
-    found = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {them} removes {share:.0%} of the mismatch"
+    found = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {them} removes {percent(share)} of the mismatch"
     return f"{found}, and {stays}."
 
 
 def _stays(errors: FitErrors) -> str:
     """The error that stays beside the sensors' floor."""
-    times = errors.times_the_floor
-    if times <= NEARLY:
-        return f"predictions over {errors.horizon:g} s err as little as sensor noise lets them"
-    return f"predictions over {errors.horizon:g} s err {times:.2g} times as much as white sensor noise makes them"
+    over = f"predictions over {errors.horizon:g} s err"
+    if errors.times_the_floor <= NEARLY:
+        return f"{over} as little as sensor noise lets them"
+    return f"{over} {compact(errors.times_the_floor, 2)} times as much as white sensor noise makes them"
 
 
 def _with_size(effect: FoundEffect, kind: str) -> str:

@@ -83,10 +83,12 @@ def excitations_for(model: Model, reach: Reach, rng: np.random.Generator, *, clo
         model: The robot.
         reach: How far it may go.
         rng: Draws the phases of the multisine.
-        closed: Whether its controller runs; else the commands themselves are shaped.
+        closed: Whether its controller runs; else the commands themselves are shaped, if the recordings have any.
     """
     phases = rng.uniform(0.0, 2.0 * np.pi, len(FREQUENCIES))
-    return _references(model, reach, phases) if closed else _commands(reach, phases)
+    if closed:
+        return _references(model, reach, phases)
+    return _commands(reach, phases) if reach.command > 0.0 else ()
 
 
 def how(excitation: Excitation, model: Model, command: float, *, closed: bool) -> str:

@@ -3,7 +3,7 @@
 Every step compares hypotheses that are fitted to the end, noise included. The penalty is that of the
 Bayesian information criterion (Schwarz 1978); evidence is divided by how much scores vary
 more than the noise model has it, and a step must also be worth a share of what is explained already, so
-that the small print of a law is not filled up with further effects.
+that what a law misses is not filled up with further effects.
 """
 
 from collections.abc import Callable
@@ -367,5 +367,5 @@ def _reason(best: str | None, gain: float, *, taken: bool) -> str:
     if taken:
         return "explains most"
     if best is None:
-        return "gains too little to be told from chance and from the small print of the laws"
+        return "gains too little: it may be chance, or what another law leaves"
     return f"explains less than {best}" if gain > 0.0 else "explains nothing"
