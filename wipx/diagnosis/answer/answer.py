@@ -54,7 +54,8 @@ def answered(context: Context, selection: Selection, rest: Rest, shapes: list[Sh
     fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
     ends = estimates(context.fitter, fit, selection.nominal)
     effects = _effects(context, selection, rest, repeated, ends, shapes)
-    left = rest.significant or (fitted.times_the_floor > FAR_OFF and not context.is_quiet(fit))
+    wrong = not context.is_quiet(fit) or context.is_worse(fit)
+    left = rest.significant or (fitted.times_the_floor > FAR_OFF and wrong)
     matters = left and fitted.times_the_floor > FAR_FROM_THE_FLOOR
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(context, rest), significant=left)

@@ -23,8 +23,8 @@ FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's pre
 # Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In
 # half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
 QUIET = 5e-4
-# Ratio of errors from states that trust a model to those from the best states, beyond which it is wrong: of 24 exact
-# robots one is at 1.51, the others below 1.4.
+# Ratio of errors beyond which a model is wrong: of those from states that trust it to those from the best states (of 24
+# exact robots one is at 1.51, the others below 1.4), and of its own to the nominal model's.
 DISTRUSTED = 1.5
 TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 
@@ -78,6 +78,8 @@ class Context:
         errors = self.errors(fit)
         if errors.times_the_floor <= FAR_FROM_THE_FLOOR:
             return True
+        if self.is_worse(fit):
+            return False
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
@@ -88,6 +90,11 @@ class Context:
         levels = self.fitter.seen_by_row(fit)[1].levels
         usual = np.array([self.setting.scales[site].force for site in self.data.plant.joints])
         return bool(np.all(levels.force <= QUIET * usual))
+
+    def is_worse(self, fit: Fit) -> bool:
+        """Whether a fit predicts the recordings far worse than the nominal model, though it was fitted to them."""
+        errors = self.errors(fit)
+        return any(error > DISTRUSTED * errors.nominal[name] for name, error in errors.completed.items())
 
     def errors(self, fit: Fit) -> FitErrors:
         """Errors of the nominal model and of a fit on the recordings."""
