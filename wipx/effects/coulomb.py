@@ -6,7 +6,8 @@ from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
 
 
-def _steady(rate, p, body):
+def steady(rate, p, body):
+    """Force of sliding [N or N m], at a rate (N,)."""
     return -p["F_c"] * np.sign(rate)
 
 
@@ -17,5 +18,5 @@ EFFECT = Effect(
     law="-F_c s(v), any force in [-F_c, F_c] at v = 0",
     linear_in=("F_c",),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
-    steady=Steady("rate", _steady),
+    steady=Steady("rate", steady),
 )

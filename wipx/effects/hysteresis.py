@@ -3,16 +3,10 @@
 With exponent 1 and asymmetry 0 it is the Dahl friction of `presliding`, whose bristle it shares.
 """
 
-import numpy as np
-
 from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import law, minimum
 from wipx.core.parameters import Parameter
-
-
-def _steady(rate, p, body):
-    return -p["F_c"] * np.sign(rate)
-
+from wipx.effects.coulomb import steady
 
 EFFECT = Effect(
     kind="hysteresis",
@@ -42,7 +36,7 @@ EFFECT = Effect(
     source="Bouc 1967; Wen 1976, Method for random vibration of hysteretic systems, ASCE J. Eng. Mech. 102(2)",
     excludes=("presliding", "lugre"),
     outside_vocabulary=True,
-    steady=Steady("rate", _steady),
+    steady=Steady("rate", steady),
 )
 
 

@@ -4,16 +4,9 @@ Canudas de Wit, Olsson, Astrom and Lischinsky (1995); its viscous term is the ef
 The bristle's laws are those of `presliding`.
 """
 
-import numpy as np
-
 from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
-from wipx.effects.stribeck import bump
-
-
-def _steady(rate, p, body):
-    return -np.sign(rate) * (p["F_c"] + np.vectorize(bump)(rate, p["F_s"], p["F_c"], p["v_s"]))
-
+from wipx.effects.stribeck import steady
 
 EFFECT = Effect(
     kind="lugre",
@@ -34,5 +27,5 @@ EFFECT = Effect(
     source="Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3)",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding"),
     outside_vocabulary=True,
-    steady=Steady("rate", _steady),
+    steady=Steady("rate", steady),
 )

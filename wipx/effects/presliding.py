@@ -1,15 +1,9 @@
 """Pre-sliding friction (Dahl, damped as in LuGre): a bristle bends before the joint slides, and remembers it."""
 
-import numpy as np
-
 from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import law, maximum, relaxing
 from wipx.core.parameters import Parameter
-
-
-def _steady(rate, p, body):
-    return -p["F_c"] * np.sign(rate)
-
+from wipx.effects.coulomb import steady
 
 EFFECT = Effect(
     kind="presliding",
@@ -26,7 +20,7 @@ EFFECT = Effect(
     ),
     source="Dahl 1968, A solid friction model, Aerospace Corporation TOR-0158(3107-18)-1; Canudas de Wit et al. 1995",
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "lugre"),
-    steady=Steady("rate", _steady),
+    steady=Steady("rate", steady),
 )
 
 

@@ -7,7 +7,8 @@ from wipx.core.law import decay, law, maximum
 from wipx.core.parameters import Parameter
 
 
-def _steady(rate, p, body):
+def steady(rate, p, body):
+    """Force of sliding [N or N m], at a rate (N,)."""
     return -np.sign(rate) * (p["F_c"] + np.vectorize(bump)(rate, p["F_s"], p["F_c"], p["v_s"]))
 
 
@@ -26,7 +27,7 @@ EFFECT = Effect(
     ),
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
     excludes=("coulomb", "asymmetric_coulomb"),
-    steady=Steady("rate", _steady),
+    steady=Steady("rate", steady),
 )
 
 
