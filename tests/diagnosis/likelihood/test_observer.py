@@ -84,7 +84,7 @@ def test_noise_levels_come_back(fresh_seed: int):
 @pytest.mark.parametrize("kind", ["pendulum", pytest.param("double_pendulum", marks=pytest.mark.slow)])
 def test_loops_stay_within_their_arrays(kind: str):
     """Compiled code does not check its indices; the same code does when it is not compiled."""
-    search = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    search = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
     command = [sys.executable, "-c", FOLLOW, kind]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": search}
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
