@@ -28,10 +28,10 @@ LEVELS = NoiseLevels(np.array([0.02]), np.array([1e-4]))  # [N s^0.5, m]
 FOLLOW = """
 import sys
 from diagnosis.recorded import bench
-from wipx.diagnosis.residuals.residual_tests import leftovers, shapes_of
+from wipx.diagnosis.residuals.residual_tests import residual_tests, shapes_of
 case = bench(sys.argv[1], {}, 0, duration=0.2)
 fit = case.fit()
-leftovers(case.fitter, fit, shapes_of(case.fitter, fit))
+residual_tests(case.fitter, fit, shapes_of(case.fitter, fit))
 """
 
 
