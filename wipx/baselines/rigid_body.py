@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
+from wipx.sim import body as B
 from wipx.sim import rows as R
 from wipx.sim.coefficients import coefficients
 
@@ -22,7 +23,11 @@ class RigidBody:
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        return coefficients(ModelBatch(self.model)).rows[:, 0]
+        return coefficients(ModelBatch(self.model)).body[:, 0]
+
+    @cached_property
+    def _rotors(self) -> np.ndarray:
+        return coefficients(ModelBatch(self.model)).joints[:, R.ROTOR, 0]
 
     def forces(self, t: np.ndarray, q: np.ndarray, rates: np.ndarray, accelerations: np.ndarray) -> np.ndarray:
         """M(q) q'' + c + g, shape (N, joints) [N or N m].
@@ -45,12 +50,12 @@ class RigidBody:
         matrix = np.zeros((len(q), len(joints), len(joints)))
         x, p = (joints.index(site) if site in joints else None for site in ("translation", "pitch"))
         if x is not None:
-            matrix[:, x, x] = rows[R.MASS] + after * rows[R.EVENT_MASS]
+            matrix[:, x, x] = rows[B.MASS] + after * rows[B.EVENT_MASS]
         if p is not None:
-            matrix[:, p, p] = rows[R.INERTIA] + after * rows[R.EVENT_INERTIA]
+            matrix[:, p, p] = rows[B.INERTIA] + after * rows[B.EVENT_INERTIA]
         if x is not None and p is not None:
-            coupling = rows[R.COUPLING] + after * rows[R.EVENT_COUPLING]
-            matrix[:, x, p] = matrix[:, p, x] = -coupling * np.cos(q[:, p] - rows[R.BALANCE] - rows[R.TILT])
+            coupling = rows[B.COUPLING] + after * rows[B.EVENT_COUPLING]
+            matrix[:, x, p] = matrix[:, p, x] = -coupling * np.cos(q[:, p] - rows[B.BALANCE] - rows[B.TILT])
         return matrix
 
     def _bias(self, t: np.ndarray, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
@@ -59,20 +64,20 @@ class RigidBody:
         forces = np.zeros_like(q)
         x, p = (joints.index(site) if site in joints else None for site in ("translation", "pitch"))
         if x is not None:
-            forces[:, x] = rows[R.TILT_FORCE] + after * rows[R.EVENT_WEIGHT]
+            forces[:, x] = rows[B.TILT_FORCE] + after * rows[B.EVENT_WEIGHT]
         if p is not None:
-            upright = q[:, p] - rows[R.BALANCE]
-            forces[:, p] = -(rows[R.GRAVITY] + after * rows[R.EVENT_GRAVITY]) * np.sin(upright)
+            upright = q[:, p] - rows[B.BALANCE]
+            forces[:, p] = -(rows[B.GRAVITY] + after * rows[B.EVENT_GRAVITY]) * np.sin(upright)
             if x is not None:
-                coupling = rows[R.COUPLING] + after * rows[R.EVENT_COUPLING]
-                forces[:, x] += coupling * np.sin(upright - rows[R.TILT]) * rates[:, p] ** 2
+                coupling = rows[B.COUPLING] + after * rows[B.EVENT_COUPLING]
+                forces[:, x] += coupling * np.sin(upright - rows[B.TILT]) * rates[:, p] ** 2
         return forces
 
     def _after_event(self, t: np.ndarray) -> np.ndarray:
         """1 from the moment of a payload event on, 0 before and without one, shape (N,)."""
         if "geometry/payload_event" not in self.model.effects:
             return np.zeros(len(t))
-        return (t >= self._rows[R.EVENT_TIME]).astype(float)
+        return (t >= self._rows[B.EVENT_TIME]).astype(float)
 
     @property
     def _is_double(self) -> bool:
@@ -80,17 +85,17 @@ class RigidBody:
 
     def _double_mass_matrix(self, q: np.ndarray) -> np.ndarray:
         rows = self._rows
-        elbow, c2 = rows[R.DP_ELBOW], np.cos(q[:, 1])
+        elbow, c2 = rows[B.DP_ELBOW], np.cos(q[:, 1])
         matrix = np.empty((len(q), 2, 2))
-        matrix[:, 0, 0] = rows[R.DP_BASE] + 2.0 * rows[R.DP_COUPLING] * c2 + rows[R.ROTOR]
-        matrix[:, 0, 1] = matrix[:, 1, 0] = elbow + rows[R.DP_COUPLING] * c2
-        matrix[:, 1, 1] = elbow + rows[R.ROTOR1]
+        matrix[:, 0, 0] = rows[B.DP_BASE] + 2.0 * rows[B.DP_COUPLING] * c2 + self._rotors[0]
+        matrix[:, 0, 1] = matrix[:, 1, 0] = elbow + rows[B.DP_COUPLING] * c2
+        matrix[:, 1, 1] = elbow + self._rotors[1]
         return matrix
 
     def _double_bias(self, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
         rows = self._rows
-        coriolis = rows[R.DP_COUPLING] * np.sin(q[:, 1])
+        coriolis = rows[B.DP_COUPLING] * np.sin(q[:, 1])
         v1, v2 = rates.T
-        lower = rows[R.DP_GRAVITY] * np.sin(q[:, 0] + q[:, 1])
-        upper = rows[R.DP_GRAVITY1] * np.sin(q[:, 0])
+        lower = rows[B.DP_GRAVITY] * np.sin(q[:, 0] + q[:, 1])
+        upper = rows[B.DP_GRAVITY1] * np.sin(q[:, 0])
         return np.column_stack([upper + lower - coriolis * (2.0 * v1 + v2) * v2, lower + coriolis * v1**2])

@@ -69,12 +69,12 @@ class Ekf:
         self.model = model
         self.noise = noise or FilterNoise()
         known = coefficients(ModelBatch(model))
-        joints = [joint_index(site) for site in model.plant.joints]
-        self._coefficients = np.ascontiguousarray(known.rows[:, 0])
-        self._double = bool(known.present[R.ON_DOUBLE])
+        joints = [joint_index(model.plant, site) for site in model.plant.joints]
+        self._body, self._blocks = (np.ascontiguousarray(known[..., 0]) for known in (known.body, known.joints))
+        self._double = model.plant.kind == "double_pendulum"
         self._states = np.array([*joints, *(2 + j for j in joints)])
-        self._driven = np.array([joint_index(site) for site in model.plant.actuated])
-        self._delay = float(self._coefficients[R.DELAY])
+        self._driven = np.array([joint_index(model.plant, site) for site in model.plant.actuated])
+        self._delay = float(self._blocks[self._driven[0], R.DELAY])
         self._ease, self._density, self._variance = np.ones(2), np.zeros(2), np.ones(4)
         for site, j in zip(model.plant.joints, joints, strict=True):
             turning = model.plant.is_angular(site)
@@ -83,8 +83,8 @@ class Ekf:
             self._variance[j] = (self.noise.angle if turning else self.noise.position) ** 2
             self._variance[2 + j] = (self.noise.angular_rate if turning else self.noise.velocity) ** 2
         self._scale, self._offset = np.ones(4), np.zeros(4)
-        self._scale[:2] += self._coefficients[R.SCALE : R.SCALE + 2]
-        self._offset[:2] = self._coefficients[R.BIAS : R.BIAS + 2]
+        self._scale[:2] += self._blocks[:, R.SCALE]
+        self._offset[:2] = self._blocks[:, R.BIAS]
         rest = np.zeros(len(self._states))
         self.reset(0.0, rest)
         self.observe(1e-3, rest)  # loads the compiled code now, not in the first step of a running robot
@@ -123,7 +123,8 @@ class Ekf:
                 self._covariance,
                 self._arrived(self._t, t),
                 t - self._t,
-                self._coefficients,
+                self._body,
+                self._blocks,
                 self._double,
                 self._ease,
                 self._density,

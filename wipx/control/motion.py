@@ -12,6 +12,7 @@ import numpy as np
 
 from wipx.core.law import clip, law, sin_cos
 from wipx.effects import dead_zone, quadratic_drag, stribeck
+from wipx.sim import body as B
 from wipx.sim import rows as R
 from wipx.sim.cache import cached
 
@@ -21,73 +22,72 @@ REACH = 1e-5  # [m, rad, m/s, rad/s] of central differences; far below the speed
 
 @law
 def drive_force(command, c):
-    """Force of a drive for a command that has arrived [N or N m]."""
+    """Force of a drive with coefficients c (BLOCK,) for a command that has arrived [N or N m]."""
     u = dead_zone.force(command * c[R.INPUT_GAIN] + c[R.OFFSET], c[R.DEAD_BAND], 0.0)
     return clip(u * c[R.GAIN], -c[R.FORCE_MAX], c[R.FORCE_MAX])
 
 
 @law
-def friction(rate, j, c, ease):
-    """Friction on joint j [N or N m]; dry friction builds up over the speed `ease`."""
-    level = c[R.LEVEL_PLUS + j] if rate > 0.0 else c[R.LEVEL_MINUS + j]
-    level += stribeck.bump(rate, c[R.STATIC + j], c[R.COULOMB + j], c[R.STRIBECK_SPEED + j])
-    level += c[R.SLIDING + j] + stribeck.bump(rate, c[R.PEAK + j], c[R.SLIDING + j], c[R.PEAK_SPEED + j])
-    level += c[R.PAPER_COULOMB + j] + stribeck.bump(
-        rate, c[R.PAPER_STATIC + j], c[R.PAPER_COULOMB + j], c[R.PAPER_SPEED + j]
-    )
-    viscous = c[R.VISCOUS + j] + c[R.PAPER_VISCOUS + j]
-    return quadratic_drag.force(rate, c[R.DRAG + j]) - level * math.tanh(rate / ease) - viscous * rate
+def friction(rate, c, ease):
+    """Friction on a joint with coefficients c (BLOCK,) [N or N m]; dry friction builds up over the speed `ease`."""
+    level = c[R.LEVEL_PLUS] if rate > 0.0 else c[R.LEVEL_MINUS]
+    level += stribeck.bump(rate, c[R.STATIC], c[R.COULOMB], c[R.STRIBECK_SPEED])
+    level += c[R.SLIDING] + stribeck.bump(rate, c[R.PEAK], c[R.SLIDING], c[R.PEAK_SPEED])
+    level += c[R.PAPER_COULOMB] + stribeck.bump(rate, c[R.PAPER_STATIC], c[R.PAPER_COULOMB], c[R.PAPER_SPEED])
+    viscous = c[R.VISCOUS] + c[R.PAPER_VISCOUS]
+    return quadratic_drag.force(rate, c[R.DRAG]) - level * math.tanh(rate / ease) - viscous * rate
 
 
 @law
-def inverse_mass(y, c, double):
+def inverse_mass(y, c, joints, double):
     """The symmetric inverse of the mass matrix, as its entries 11, 12, 22."""
     if double:
         _, cosine = sin_cos(y[1])
-        elbow = c[R.DP_ELBOW] + c[R.DP_COUPLING] * cosine
-        m11 = c[R.DP_BASE] + 2.0 * c[R.DP_COUPLING] * cosine + c[R.ROTOR]
-        m12, m22 = elbow, c[R.DP_ELBOW] + c[R.ROTOR1]
+        elbow = c[B.DP_ELBOW] + c[B.DP_COUPLING] * cosine
+        m11 = c[B.DP_BASE] + 2.0 * c[B.DP_COUPLING] * cosine + joints[0, R.ROTOR]
+        m12, m22 = elbow, c[B.DP_ELBOW] + joints[1, R.ROTOR]
     else:
-        _, cosine = sin_cos(y[1] - c[R.BALANCE] - c[R.TILT])
-        m11, m12, m22 = c[R.MASS], -c[R.COUPLING] * cosine, c[R.INERTIA]
+        _, cosine = sin_cos(y[1] - c[B.BALANCE] - c[B.TILT])
+        m11, m12, m22 = c[B.MASS], -c[B.COUPLING] * cosine, c[B.INERTIA]
     determinant = m11 * m22 - m12 * m12
     return m22 / determinant, -m12 / determinant, m11 / determinant
 
 
 @law
-def slopes(y, commands, c, double, ease):
+def slopes(y, commands, c, joints, double, ease):
     """Rates and accelerations of both joints at the state y = [coordinates, rates]."""
-    force = drive_force(commands[0], c) + friction(y[2], 0, c, ease[0])
-    force1 = drive_force(commands[1], c) + friction(y[3], 1, c, ease[1])
+    first, second = joints[0], joints[1]
+    force = drive_force(commands[0], first) + friction(y[2], first, ease[0])
+    force1 = drive_force(commands[1], second) + friction(y[3], second, ease[1])
     if double:
         sine, _ = sin_cos(y[1])
         sine1, _ = sin_cos(y[0])
         sine12, _ = sin_cos(y[0] + y[1])
-        coupling, lower = c[R.DP_COUPLING] * sine, c[R.DP_GRAVITY] * sine12
-        force += coupling * (2.0 * y[2] + y[3]) * y[3] - c[R.DP_GRAVITY1] * sine1 - lower
+        coupling, lower = c[B.DP_COUPLING] * sine, c[B.DP_GRAVITY] * sine12
+        force += coupling * (2.0 * y[2] + y[3]) * y[3] - c[B.DP_GRAVITY1] * sine1 - lower
         force1 -= coupling * y[2] * y[2] + lower
     else:
-        upright = y[1] - c[R.BALANCE]
+        upright = y[1] - c[B.BALANCE]
         sine, _ = sin_cos(upright)
-        sine_to_rail, _ = sin_cos(upright - c[R.TILT])
-        force -= c[R.COUPLING] * sine_to_rail * y[3] * y[3] + c[R.TILT_FORCE]
-        force -= c[R.SPRING] * (y[0] - c[R.SPRING_REST])
-        force1 += c[R.GRAVITY] * sine
-    w11, w12, w22 = inverse_mass(y, c, double)
+        sine_to_rail, _ = sin_cos(upright - c[B.TILT])
+        force -= c[B.COUPLING] * sine_to_rail * y[3] * y[3] + c[B.TILT_FORCE]
+        force -= first[R.SPRING] * (y[0] - first[R.SPRING_REST])
+        force1 += c[B.GRAVITY] * sine
+    w11, w12, w22 = inverse_mass(y, c, joints, double)
     return np.array([y[2], y[3], w11 * force + w12 * force1, w12 * force + w22 * force1])
 
 
 @law
-def moved(y, commands, step, c, double, ease):
+def moved(y, commands, step, c, joints, double, ease):
     """The state after a `step`, by the midpoint rule."""
-    middle = y + 0.5 * step * slopes(y, commands, c, double, ease)
-    return y + step * slopes(middle, commands, c, double, ease)
+    middle = y + 0.5 * step * slopes(y, commands, c, joints, double, ease)
+    return y + step * slopes(middle, commands, c, joints, double, ease)
 
 
 @law
-def spread(y, step, density, c, double):
+def spread(y, step, density, c, joints, double):
     """Covariance that white forces of a spectral `density` (2,) [N^2 s] add in a `step`, shape (4, 4)."""
-    w11, w12, w22 = inverse_mass(y, c, double)
+    w11, w12, w22 = inverse_mass(y, c, joints, double)
     added = np.zeros((4, 4))
     accelerations = (
         (w11 * w11 * density[0] + w12 * w12 * density[1], w12 * (w11 * density[0] + w22 * density[1])),
@@ -103,7 +103,7 @@ def spread(y, step, density, c, double):
 
 
 @cached
-def propagate(y, covariance, commands, duration, c, double, ease, density):
+def propagate(y, covariance, commands, duration, c, joints, double, ease, density):
     """State and covariance after a `duration` under held commands.
 
     Args:
@@ -111,7 +111,8 @@ def propagate(y, covariance, commands, duration, c, double, ease, density):
         covariance: Shape (4, 4).
         commands: On both joints, after the delay, shape (2,) [N or N m].
         duration: Any length [s].
-        c: Coefficients of the model, shape (N_COEFFICIENTS,).
+        c: Numbers of the rigid body, shape (rows,).
+        joints: Coefficients of the joints, shape (2, BLOCK).
         double: Whether it is a double pendulum.
         ease: Speed over which dry friction builds up, shape (2,) [m/s or rad/s].
         density: Spectral density of unknown forces on the joints, shape (2,) [N^2 s or (N m)^2 s].
@@ -127,11 +128,13 @@ def propagate(y, covariance, commands, duration, c, double, ease, density):
             ahead, behind = y.copy(), y.copy()
             ahead[i] += REACH
             behind[i] -= REACH
-            difference = moved(ahead, commands, step, c, double, ease) - moved(behind, commands, step, c, double, ease)
+            difference = moved(ahead, commands, step, c, joints, double, ease) - moved(
+                behind, commands, step, c, joints, double, ease
+            )
             jacobian[:, i] = difference / (2.0 * REACH)
-        covariance = jacobian @ covariance @ jacobian.T + spread(y, step, density, c, double)
+        covariance = jacobian @ covariance @ jacobian.T + spread(y, step, density, c, joints, double)
         covariance = 0.5 * (covariance + covariance.T)  # of round-off, an asymmetry would grow without end
-        y = moved(y, commands, step, c, double, ease)
+        y = moved(y, commands, step, c, joints, double, ease)
     return y, covariance
 
 

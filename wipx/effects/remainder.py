@@ -8,14 +8,21 @@ from wipx.core.effect import JOINT_SITES, Effect
 from wipx.core.parameters import Parameter
 
 KNOTS = 9
-COORDINATES, RATES, COMMANDS, TIME = (0, 1), (2, 3), (4, 5), 6  # codes of the signals, by joint
 HIGHEST = 1e9
 
 EFFECT = Effect(
     kind="remainder",
     sites=JOINT_SITES,
     parameters=(
-        Parameter("signal", "0, 1 coordinates, 2, 3 rates, 4, 5 commands, 6 time", "ratio", 0.0, 0.0, 6.0, 0.0),
+        Parameter(
+            "signal",
+            "place among coordinates, rates, commands, time",
+            "ratio",
+            0.0,
+            0.0,
+            999.0,
+            0.0,
+        ),
         Parameter("factor", "0: a force, 1: share of the command, -1: dry friction", "ratio", 0.0, -1.0, 1.0, 0.0),
         Parameter("low", "first knot, in the unit of the signal", "ratio", 0.0, -HIGHEST, HIGHEST, 0.0),
         Parameter("high", "last knot", "ratio", 1.0, -HIGHEST, HIGHEST, 1.0),

@@ -116,7 +116,7 @@ class Predictor:
         return [state, soft._settle(batch, state).state] if self._sticks(batch) else [state]
 
     def _sticks(self, batch: ModelBatch) -> bool:
-        return not self.simulator.smoothing and bool(coefficients(batch).present[ON_FRICTION])
+        return not self.simulator.smoothing and bool(coefficients(batch).on[ON_FRICTION])
 
     @cached_property
     def _softened(self) -> "Predictor":

@@ -11,6 +11,7 @@ import numpy as np
 from wipx.control.ekf import EASE_SLIDING, EASE_TURNING
 from wipx.core.model import Model, ModelBatch
 from wipx.learn.loads import carrying
+from wipx.sim import body as B
 from wipx.sim import rows as R
 from wipx.sim.coefficients import coefficients
 from wipx.sim.simulator import StateFeedback
@@ -52,22 +53,22 @@ class LoadedBody:
         place = [loads[:, 1].mean(), np.sqrt(np.mean(loads[:, 2] ** 2))]
         masses = np.array([0.5, 1.5]) * loads[:, 0].mean()
         # All but the distance of the centre of mass is in proportion to the load's mass, and that almost is.
-        both = coefficients(carrying(ModelBatch(model), np.array([[mass, *place] for mass in masses]))).rows
+        known = coefficients(carrying(ModelBatch(model), np.array([[mass, *place] for mass in masses])))
+        both = known.body
         per_mass = (both[:, 1] - both[:, 0]) / (masses[1] - masses[0])
         pairs = np.stack([both[:, 0] - per_mass * masses[0], per_mass], axis=1)
-        c = both[:, 0]
-        drive = float(c[R.INPUT_GAIN] * c[R.GAIN])
-        joints = np.arange(2)
-        level = 0.5 * (c[R.LEVEL_PLUS + joints] + c[R.LEVEL_MINUS + joints])
+        c = known.joints[:, :, 0].T
+        drive = float(c[R.INPUT_GAIN, 0] * c[R.GAIN, 0])
+        level = 0.5 * (c[R.LEVEL_PLUS] + c[R.LEVEL_MINUS])
         return cls(
-            pairs[R.MASS],
-            pairs[R.COUPLING],
-            pairs[R.INERTIA],
-            pairs[R.GRAVITY],
+            pairs[B.MASS],
+            pairs[B.COUPLING],
+            pairs[B.INERTIA],
+            pairs[B.GRAVITY],
             drive * feedback.gains[0],
-            min(abs(drive) * feedback.limit, float(c[R.FORCE_MAX])),
-            c[R.VISCOUS + joints] + c[R.PAPER_VISCOUS + joints],
-            level + c[R.SLIDING + joints] + c[R.PAPER_COULOMB + joints],
+            min(abs(drive) * feedback.limit, float(c[R.FORCE_MAX, 0])),
+            c[R.VISCOUS] + c[R.PAPER_VISCOUS],
+            level + c[R.SLIDING] + c[R.PAPER_COULOMB],
         )
 
     def moved(self, states: np.ndarray, duration: float) -> np.ndarray:

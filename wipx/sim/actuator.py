@@ -13,37 +13,33 @@ from wipx.sim.rows import W
 
 
 @law
-def delayed_command(S, n, on, t_rows, u_rows, ramps, lanes, pointers, actuated):
-    """The mean command over the step, after the transport delay (scalar: every lane has its own past)."""
+def delayed_command(S, J, n, on, t_rows, u_rows, ramps, lanes, pointers, j):
+    """The mean command of joint j over the step, after the transport delay (scalar: every lane has its own past)."""
     last = t_rows.shape[0] - 2
     for w in range(n):
         h = S[R.STEP * W + w]
         if h <= 0.0:
-            S[R.DRIVE * W + w], S[R.DRIVE1 * W + w] = S[R.COMMAND * W + w], S[R.COMMAND1 * W + w]
+            J[R.DRIVE * W + w] = J[R.COMMAND * W + w]
             continue
         window, column = lanes[0, w], lanes[1, w]
-        begin = S[R.TIME * W + w] - S[R.DELAY * W + w]
+        begin = S[R.TIME * W + w] - J[R.DELAY * W + w]
         end = begin + h
-        k = pointers[w]
+        k = pointers[j, w]
         while k < last and t_rows[k + 1, window] <= begin:
             k += 1
-        pointers[w] = k
-        for j in range(2):
-            if not actuated[j]:
-                continue
-            total = 0.0
-            done = begin
-            i = k
-            while i < last and t_rows[i + 1, window] < end:
-                total += (t_rows[i + 1, window] - done) * u_rows[i, j, column]
-                if on[R.ON_RAMP]:
-                    total += ramped(t_rows, ramps, window, i, j, done, t_rows[i + 1, window])
-                done = t_rows[i + 1, window]
-                i += 1
-            total += (end - done) * u_rows[i, j, column]
+        pointers[j, w] = k
+        total = 0.0
+        done = begin
+        while k < last and t_rows[k + 1, window] < end:
+            total += (t_rows[k + 1, window] - done) * u_rows[k, j, column]
             if on[R.ON_RAMP]:
-                total += ramped(t_rows, ramps, window, i, j, done, end)
-            S[(R.DRIVE + j) * W + w] = total / h * S[R.INPUT_GAIN * W + w]
+                total += ramped(t_rows, ramps, window, k, j, done, t_rows[k + 1, window])
+            done = t_rows[k + 1, window]
+            k += 1
+        total += (end - done) * u_rows[k, j, column]
+        if on[R.ON_RAMP]:
+            total += ramped(t_rows, ramps, window, k, j, done, end)
+        J[R.DRIVE * W + w] = total / h * J[R.INPUT_GAIN * W + w]
 
 
 @law
@@ -55,71 +51,70 @@ def ramped(t_rows, ramps, window, i, j, begin, end):
 
 
 @inlined
-def actuator_path(S, n, on, j):
-    """From the command of joint j to the force on it."""
-    u = (R.DRIVE + j) * W
-    v = (R.RATE + j) * W
-    if on[R.ON_OFFSET]:
+def actuator_path(J, n, on, has, j):
+    """From the command of a joint to the force on it."""
+    if has[j, R.ON_OFFSET]:
         for w in range(n):
-            S[u + w] += S[R.OFFSET * W + w]
-    if on[R.ON_DEAD_ZONE]:
+            J[R.DRIVE * W + w] += J[R.OFFSET * W + w]
+    if has[j, R.ON_DEAD_ZONE]:
         for w in range(n):
-            S[u + w] = dead_zone.force(S[u + w], S[R.DEAD_BAND * W + w], S[(R.SPREAD + j) * W + w])
-    for w in range(n):
-        S[u + w] *= S[R.GAIN * W + w]
-    if on[R.ON_SATURATION]:
+            J[R.DRIVE * W + w] = dead_zone.force(J[R.DRIVE * W + w], J[R.DEAD_BAND * W + w], J[R.SPREAD * W + w])
+    if has[j, R.ON_GAIN]:
         for w in range(n):
-            S[u + w] = saturation.force(S[u + w], S[R.FORCE_MAX * W + w], S[(R.SPREAD + j) * W + w])
-    if on[R.ON_SPEED_LIMIT]:
+            J[R.DRIVE * W + w] *= J[R.GAIN * W + w]
+    if has[j, R.ON_SATURATION]:
         for w in range(n):
-            S[u + w] = speed_limit.limited(
-                S[u + w], S[v + w], S[R.STALL * W + w], S[R.FREE_SPEED * W + w], S[(R.SPREAD + j) * W + w]
+            J[R.DRIVE * W + w] = saturation.force(J[R.DRIVE * W + w], J[R.FORCE_MAX * W + w], J[R.SPREAD * W + w])
+    if has[j, R.ON_SPEED_LIMIT]:
+        for w in range(n):
+            J[R.DRIVE * W + w] = speed_limit.limited(
+                J[R.DRIVE * W + w], J[R.RATE * W + w], J[R.STALL * W + w], J[R.FREE_SPEED * W + w], J[R.SPREAD * W + w]
             )
-    if on[R.ON_BACK_EMF]:
+    if has[j, R.ON_BACK_EMF]:
         for w in range(n):
-            S[u + w] -= S[R.BACK_EMF * W + w] * S[v + w]
-    if on[R.ON_LAG]:
-        a = (R.LAGGED + j) * W
+            J[R.DRIVE * W + w] -= J[R.BACK_EMF * W + w] * J[R.RATE * W + w]
+    if has[j, R.ON_LAG]:
         for w in range(n):
-            rest = S[R.STARTED * W + w] * (S[a + w] - S[u + w])
-            S[a + w] = S[u + w] + rest * S[R.LAG_KEPT * W + w] if S[R.STEP * W + w] > 0.0 else S[a + w]
-            S[u + w] += rest * S[R.LAG_MEAN * W + w]
+            rest = J[R.STARTED * W + w] * (J[R.LAGGED * W + w] - J[R.DRIVE * W + w])
+            lagged = J[R.DRIVE * W + w] + rest * J[R.LAG_KEPT * W + w]
+            J[R.LAGGED * W + w] = lagged if J[R.H * W + w] > 0.0 else J[R.LAGGED * W + w]
+            J[R.DRIVE * W + w] += rest * J[R.LAG_MEAN * W + w]
     if on[R.ON_REPORT]:
         for w in range(n):
-            S[(R.DELIVERED + j) * W + w] += S[R.STEP * W + w] * S[u + w]
-    if on[R.ON_RIPPLE]:
+            J[R.DELIVERED * W + w] += J[R.H * W + w] * J[R.DRIVE * W + w]
+    if has[j, R.ON_RIPPLE]:
         for w in range(n):
-            angle = S[R.RIPPLE_PERIODS * W + w] * S[(R.MID + j) * W + w] + S[R.RIPPLE_PHASE * W + w]
+            angle = J[R.RIPPLE_PERIODS * W + w] * J[R.MID * W + w] + J[R.RIPPLE_PHASE * W + w]
             _, cosine = sin_cos(angle)
-            S[u + w] += S[R.RIPPLE * W + w] * cosine
-    if on[R.ON_BACKLASH]:
-        backlash(S, n, j)
+            J[R.DRIVE * W + w] += J[R.RIPPLE * W + w] * cosine
+    if has[j, R.ON_BACKLASH]:
+        backlash(J, n)
 
 
-@inlined
-def backlash(S, n, j):
-    """Pass on the force of joint j where its drive is in contact."""
+@law
+def backlash(J, n):
+    """Pass on the force of a joint where its drive is in contact."""
     for w in range(n):
-        force = S[(R.DRIVE + j) * W + w]
-        gap = S[R.GAP * W + w]
-        begun = S[R.STARTED * W + w] > 0.0
-        before = S[(R.PLACE + j) * W + w] if begun else 0.5 * gap * sign(force)
+        force = J[R.DRIVE * W + w]
+        gap = J[R.GAP * W + w]
+        begun = J[R.STARTED * W + w] > 0.0
+        before = J[R.PLACE * W + w] if begun else 0.5 * gap * sign(force)
         place, speed, passed = backlash_law.cross(
             before,
-            S[(R.DRIVE_SPEED + j) * W + w],
+            J[R.DRIVE_SPEED * W + w],
             force,
-            S[(R.ACCELERATION + j) * W + w] - S[(R.MADE + j) * W + w],
-            S[(R.LIGHTNESS + j) * W + w],
+            J[R.ACCELERATION * W + w] - J[R.MADE * W + w],
+            J[R.LIGHTNESS * W + w],
             gap,
-            S[R.DRIVE_INERTIA * W + w],
-            S[R.DRIVE_DAMPING * W + w],
-            S[R.RETURNED * W + w],
-            S[R.STEP * W + w],
+            J[R.DRIVE_INERTIA * W + w],
+            J[R.DRIVE_DAMPING * W + w],
+            J[R.RETURNED * W + w],
+            J[R.H * W + w],
         )
         passed = passed if gap > 0.0 else force
-        rest = S[(R.PASSED + j) * W + w] - passed if begun and gap > 0.0 else 0.0
-        S[(R.PLACE + j) * W + w] = place
-        S[(R.DRIVE_SPEED + j) * W + w] = speed
-        if S[R.STEP * W + w] > 0.0:
-            S[(R.PASSED + j) * W + w] = passed + rest * S[R.CONTACT_KEPT * W + w]
-        S[(R.DRIVE + j) * W + w] = passed + rest * S[R.CONTACT_MEAN * W + w]
+        rest = J[R.PASSED * W + w] - passed if begun and gap > 0.0 else 0.0
+        J[R.PLACE * W + w] = place
+        J[R.DRIVE_SPEED * W + w] = speed
+        if J[R.H * W + w] > 0.0:
+            J[R.PASSED * W + w] = passed + rest * J[R.CONTACT_KEPT * W + w]
+        J[R.DRIVE * W + w] = passed + rest * J[R.CONTACT_MEAN * W + w]

@@ -18,13 +18,11 @@ from wipx.sim import rows as R
 from wipx.sim.coefficients import coefficients
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
-from wipx.sim.layout import HELD, NO_ROWS, OPEN, Layout
+from wipx.sim.layout import ClosedLoop, Layout
 from wipx.sim.rows import TOGETHER
 from wipx.sim.simulator import Path, Rollouts, StateFeedback
 
 LEAST_WORK_PER_THREAD = 75_000  # lane steps, about 1 ms: less is not worth a thread
-NO_OBSERVER = np.zeros((1, 1, 1, 4, 4))
-NO_DRIFT = np.zeros((1, 1, 1, 2, 4))
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,7 @@ class AnalyticSimulator:
         """
         run = _Run(self, batch, inputs)
         layout = run.layout
-        commands = np.zeros((layout.rows, 2, layout.lanes))
+        commands = np.zeros((layout.rows, layout.width, layout.lanes))
         loop = layout.loop(feedback, references, noise)
         run.advance(layout.states(initial), 0, layout.rows, commands, loop)
         return run.rollouts(layout.per_command(commands))
@@ -143,7 +141,7 @@ class AnalyticSimulator:
         run = _Run(self, ModelBatch(model), inputs)
         layout = run.layout
         states = layout.states(initial[:, None, None])
-        commands = np.zeros((layout.rows, 2, 1))
+        commands = np.zeros((layout.rows, layout.width, 1))
         run.advance(states, 0, 0, commands)
         for k in range(layout.rows):
             measured = run.out[k, layout.pattern, 0]
@@ -163,41 +161,48 @@ class _Run:
         self.coefficients = coefficients(batch, simulator.smoothing)
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
-        self.out = np.empty((self.layout.rows + 1, 4, self.layout.lanes))
-        self.past = self.layout.past(self.coefficients.present)
-        self.delivered = np.zeros((1, 2, 1))
+        self.out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))
+        self.past = self.layout.past(self.coefficients.on)
+        self.delivered = self.layout.held()
 
     def begin(self, initial: np.ndarray) -> int:
         """Row from which a replay must be simulated: that of the first step, where no sensor looks further back."""
-        row = 0 if self.coefficients.present[R.ON_SENSOR_DELAY] else int(self.inputs.first.min())
-        shown = self.layout.states(initial)[:4]
-        self.out[:row] = shown
+        row = 0 if self.coefficients.on[R.ON_SENSOR_DELAY] else int(self.inputs.first.min())
+        if row:
+            states = self.layout.states(initial)
+            self.out[:row] = np.concatenate([states[:, R.Q], states[:, R.V]])
         return row
 
     def report(self) -> None:
         """Keep the forces of the drives too."""
-        self.coefficients.present[R.ON_REPORT] = True
-        self.delivered = np.zeros((self.layout.rows, 2, self.layout.lanes))
+        self.coefficients.on[R.ON_REPORT] = True
+        self.delivered = np.zeros((self.layout.rows, self.layout.width, self.layout.lanes))
 
-    def advance(self, states, first_row, last_row, commands=None, loop=OPEN, observer=None, path=None) -> None:
-        """Simulate rows; `commands` (K, 2, lanes) are per lane, otherwise the inputs' own are replayed."""
+    def advance(
+        self, states, first_row, last_row, commands=None, loop: ClosedLoop | None = None, observer=None, path=None
+    ) -> None:
+        """Simulate rows; `commands` (K, N, lanes) are per lane, otherwise the inputs' own are replayed."""
         per_lane = commands is not None
-        ramps = HELD
+        closed, ramps = loop is not None, None
         if commands is None:
             commands = self.layout.recorded()
             ramps = self.layout.ramps()
-            self.coefficients.present[R.ON_RAMP] = ramps is not HELD
+        self.coefficients.on[R.ON_RAMP] = ramps is not None
+        ramps = self.layout.held() if ramps is None else ramps
+        loop = loop or self.layout.open_loop()
         measured, corrections, drift, group = self._observed(observer)
         led, until = self.layout.led(path)
-        spread = np.zeros((2, self.batch.size))
+        spread = np.zeros((self.layout.width, self.batch.size))
         if observer is not None:
             spread[self.layout.driven] = observer.spread.T
 
         def work(begin: int, end: int) -> None:
             rollout(
-                self.coefficients.rows,
-                self.coefficients.present,
-                self.coefficients.actuated,
+                self.coefficients.body,
+                self.coefficients.joints,
+                self.coefficients.on,
+                self.coefficients.has,
+                self.coefficients.parts,
                 states,
                 self.inputs.t,
                 commands,
@@ -206,7 +211,7 @@ class _Run:
                 self.row_steps,
                 self.substeps,
                 per_lane,
-                loop is not OPEN,
+                closed,
                 loop.gains,
                 loop.references,
                 loop.noise,
@@ -236,17 +241,19 @@ class _Run:
 
     def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Recorded signals, both kinds of gains and groups in the kernel's layout."""
+        width, pattern = self.layout.width, self.layout.pattern
+        none = np.zeros((1, 1, 1, width, 2 * width))
         if observer is None:
-            return NO_ROWS, NO_OBSERVER, NO_DRIFT, np.zeros(1, dtype=np.int64)
-        pattern = self.layout.pattern
-        measured = np.zeros((self.layout.rows + 1, 4, self.inputs.windows))
+            rows = np.zeros((1, 2 * width, 1))
+            return rows, np.zeros((1, 1, 1, 2 * width, 2 * width)), none, np.zeros(1, dtype=np.int64)
+        measured = np.zeros((self.layout.rows + 1, 2 * width, self.inputs.windows))
         measured[:, pattern] = observer.recorded
-        gains, drift = observer.gains, NO_DRIFT
-        if len(pattern) < 4:
-            gains = np.zeros((*observer.gains.shape[:3], 4, 4))
+        gains, drift = observer.gains, none
+        if len(pattern) < 2 * width:
+            gains = np.zeros((*observer.gains.shape[:3], 2 * width, 2 * width))
             gains[..., np.array(pattern)[:, None], pattern] = observer.gains
         if observer.drift is not None:
-            drift = np.zeros((*observer.drift.shape[:3], 2, 4))
+            drift = np.zeros((*observer.drift.shape[:3], width, 2 * width))
             drift[..., np.array(pattern[: len(pattern) // 2])[:, None], pattern] = observer.drift
         return measured, gains, drift, observer.group.astype(np.int64)
 
@@ -260,5 +267,5 @@ class _Run:
         return [TOGETHER * (vectors * i // shares) for i in range(shares)] + [lanes]
 
     def rollouts(self, commands: np.ndarray) -> Rollouts:
-        reported = self.coefficients.present[R.ON_REPORT]
+        reported = self.coefficients.on[R.ON_REPORT]
         return self.layout.rollouts(self.out, commands, self.layout.per_command(self.delivered) if reported else None)

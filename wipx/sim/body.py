@@ -1,82 +1,102 @@
-"""Mass matrix and forces of rigid body and environment in mid-step; compiled. Contract section 2."""
+"""Mass matrix and forces of the rigid bodies of contract section 2 in mid-step; compiled.
+
+A rigid body is a function of the rows of a block: it writes the mass matrix and adds its forces to those on the
+joints. The five plants of contract section 2 have two joints here: translation and joint1 are the first, pitch and
+joint2 the second; one that a plant lacks stays at rest.
+"""
 
 from wipx.core.law import clip, law, maximum, sin_cos
 from wipx.sim import rows as R
+from wipx.sim.cache import part
 from wipx.sim.rows import W
 
+JOINTS = 2
+M11, M12, M22 = range(R.COMMON, R.COMMON + 3)
 
-@law
-def load_body(S, n):
-    """The body as it is before any payload event."""
-    for w in range(n):
-        S[R.M11 * W + w] = S[R.MASS * W + w]
-        S[R.M22 * W + w] = S[R.INERTIA * W + w]
-        S[R.COUPLING_NOW * W + w] = S[R.COUPLING * W + w]
-        S[R.GRAVITY_NOW * W + w] = S[R.GRAVITY * W + w]
+# Numbers of the rigid body.
+(
+    MASS, COUPLING, INERTIA, GRAVITY,  # wip family: M11, m_b L, M22, m_b g L
+    BALANCE, TILT, TILT_FORCE,
+    EVENT_MASS, EVENT_COUPLING, EVENT_INERTIA, EVENT_GRAVITY, EVENT_WEIGHT, EVENT_TIME,
+    DP_BASE, DP_ELBOW, DP_COUPLING, DP_GRAVITY, DP_GRAVITY1,  # double pendulum
+    ROWS,
+    *_,
+) = range(R.COMMON + 3, 100)  # fmt: skip
 
 
 @law
 def share_after(S, w):
     """Share of the step of lane w that is after the payload event."""
     h = maximum(S[R.STEP * W + w], 1e-12)
-    return clip((S[R.TIME * W + w] + h - S[R.EVENT_TIME * W + w]) / h, 0.0, 1.0)
+    return clip((S[R.TIME * W + w] + h - S[EVENT_TIME * W + w]) / h, 0.0, 1.0)
 
 
 @law
-def payload_event(S, n):
+def payload_event(S, B, n):
     """Masses after t0 in place of those before, weighed by the share of the step after t0."""
-    load_body(S, n)
+    P, D = B[0], B[1]
     for w in range(n):
         after = share_after(S, w)
-        S[R.M11 * W + w] += after * S[R.EVENT_MASS * W + w]
-        S[R.M22 * W + w] += after * S[R.EVENT_INERTIA * W + w]
-        S[R.COUPLING_NOW * W + w] += after * S[R.EVENT_COUPLING * W + w]
-        S[R.GRAVITY_NOW * W + w] += after * S[R.EVENT_GRAVITY * W + w]
-        S[R.FORCE * W + w] -= after * S[R.EVENT_WEIGHT * W + w]
+        s, c = sin_cos(D[R.MID * W + w] - S[BALANCE * W + w])
+        rate = D[R.RATE * W + w]
+        coupling = after * S[EVENT_COUPLING * W + w]
+        S[M11 * W + w] += after * S[EVENT_MASS * W + w]
+        S[M22 * W + w] += after * S[EVENT_INERTIA * W + w]
+        S[M12 * W + w] -= coupling * c
+        P[R.FORCE * W + w] -= coupling * s * rate * rate + after * S[EVENT_WEIGHT * W + w]
+        D[R.FORCE * W + w] += after * S[EVENT_GRAVITY * W + w] * s
 
 
 @law
-def spring(S, n):
-    """Cable, hose or bumper on the carriage."""
+def tilted(S, B, n, on):
+    """The coupling sees the angle to the tilted rail, gravity the angle to the vertical."""
+    P, D = B[0], B[1]
     for w in range(n):
-        S[R.FORCE * W + w] -= S[R.SPRING * W + w] * (S[R.MID * W + w] - S[R.SPRING_REST * W + w])
+        upright = D[R.MID * W + w] - S[BALANCE * W + w]
+        s0, _ = sin_cos(upright)
+        s, c = sin_cos(upright - S[TILT * W + w])
+        rate = D[R.RATE * W + w]
+        coupling = S[COUPLING * W + w]
+        if on[R.ON_EVENT]:
+            coupling += share_after(S, w) * S[EVENT_COUPLING * W + w]
+        S[M12 * W + w] = -coupling * c
+        P[R.FORCE * W + w] += coupling * (s0 - s) * rate * rate - S[TILT_FORCE * W + w]
 
 
-@law
-def wip_body(S, n, on):
-    """Mass matrix and forces of the rigid body; contract section 2."""
+@part
+def wip_body(S, B, n, on):
+    """Wip, cart-pole, pendulum, linear axis."""
+    P, D = B[0], B[1]
     for w in range(n):
-        s, c = sin_cos(S[R.MID1 * W + w] - S[R.BALANCE * W + w])
-        rate = S[R.RATE1 * W + w]
-        coupling = S[R.COUPLING_NOW * W + w]
-        S[R.M12 * W + w] = -coupling * c
-        S[R.FORCE * W + w] -= coupling * s * rate * rate
-        S[R.FORCE1 * W + w] += S[R.GRAVITY_NOW * W + w] * s
+        S[M11 * W + w] = S[MASS * W + w]
+        S[M22 * W + w] = S[INERTIA * W + w]
+    for w in range(n):
+        s, c = sin_cos(D[R.MID * W + w] - S[BALANCE * W + w])
+        rate = D[R.RATE * W + w]
+        coupling = S[COUPLING * W + w]
+        S[M12 * W + w] = -coupling * c
+        P[R.FORCE * W + w] -= coupling * s * rate * rate
+        D[R.FORCE * W + w] += S[GRAVITY * W + w] * s
+    if on[R.ON_EVENT]:
+        payload_event(S, B, n)
     if on[R.ON_TILT]:
-        # The coupling sees the angle to the rail, gravity the angle to the vertical.
-        for w in range(n):
-            upright = S[R.MID1 * W + w] - S[R.BALANCE * W + w]
-            s0, _ = sin_cos(upright)
-            s, c = sin_cos(upright - S[R.TILT * W + w])
-            rate = S[R.RATE1 * W + w]
-            coupling = S[R.COUPLING_NOW * W + w]
-            S[R.M12 * W + w] = -coupling * c
-            S[R.FORCE * W + w] += coupling * (s0 - s) * rate * rate - S[R.TILT_FORCE * W + w]
+        tilted(S, B, n, on)
 
 
-@law
-def double_body(S, n):
-    """Mass matrix and forces of the double pendulum, theta1 = 0 hanging."""
+@part
+def double_body(S, B, n, on):
+    """Double pendulum, theta1 = 0 hanging."""
+    P, D = B[0], B[1]
     for w in range(n):
-        s2, c2 = sin_cos(S[R.MID1 * W + w])
-        s1, _ = sin_cos(S[R.MID * W + w])
-        s12, _ = sin_cos(S[R.MID * W + w] + S[R.MID1 * W + w])
-        v1, v2 = S[R.RATE * W + w], S[R.RATE1 * W + w]
-        h = S[R.DP_COUPLING * W + w]
-        elbow = S[R.DP_ELBOW * W + w]
-        S[R.M11 * W + w] = S[R.DP_BASE * W + w] + 2.0 * h * c2 + S[R.ROTOR * W + w]
-        S[R.M12 * W + w] = elbow + h * c2
-        S[R.M22 * W + w] = elbow + S[R.ROTOR1 * W + w]
-        lower = S[R.DP_GRAVITY * W + w] * s12
-        S[R.FORCE * W + w] += h * s2 * (2.0 * v1 + v2) * v2 - S[R.DP_GRAVITY1 * W + w] * s1 - lower
-        S[R.FORCE1 * W + w] -= h * s2 * v1 * v1 + lower
+        s2, c2 = sin_cos(D[R.MID * W + w])
+        s1, _ = sin_cos(P[R.MID * W + w])
+        s12, _ = sin_cos(P[R.MID * W + w] + D[R.MID * W + w])
+        v1, v2 = P[R.RATE * W + w], D[R.RATE * W + w]
+        h = S[DP_COUPLING * W + w]
+        elbow = S[DP_ELBOW * W + w]
+        S[M11 * W + w] = S[DP_BASE * W + w] + 2.0 * h * c2 + P[R.ROTOR * W + w]
+        S[M12 * W + w] = elbow + h * c2
+        S[M22 * W + w] = elbow + D[R.ROTOR * W + w]
+        lower = S[DP_GRAVITY * W + w] * s12
+        P[R.FORCE * W + w] += h * s2 * (2.0 * v1 + v2) * v2 - S[DP_GRAVITY1 * W + w] * s1 - lower
+        D[R.FORCE * W + w] += -h * s2 * v1 * v1 - lower

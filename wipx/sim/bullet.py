@@ -10,7 +10,6 @@ import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model
-from wipx.sim import exchange as E
 from wipx.sim.exchange import Exchange
 from wipx.sim.mechanism import EVENT, mechanism
 from wipx.sim.stepped import SteppedSimulator, World
@@ -45,7 +44,7 @@ class BulletSimulator(SteppedSimulator):
 
 @dataclass(frozen=True)
 class _Lane:
-    """Views of what is exchanged with one lane, each of shape (joints,), the mass matrix row by row."""
+    """Views of what is exchanged with one lane, each of shape (joints,), or (joints, joints) of the mass matrix."""
 
     place: np.ndarray
     speed: np.ndarray
@@ -57,7 +56,7 @@ class _Lane:
     @classmethod
     def of(cls, exchange: Exchange, lane: int) -> "_Lane":
         place, speed, bias, gained, push = (
-            exchange.of(row, lane) for row in (E.PLACE, E.SPEED, E.BIAS, E.GAINED, E.PUSH)
+            exchange.joint(name, lane) for name in ("place", "speed", "bias", "gained", "push")
         )
         return cls(place, speed, exchange.mass(lane), bias, gained, push)
 
@@ -79,11 +78,11 @@ class BulletWorld:
         self.bullet.setGravity(0.0, 0.0, -model.parameters["gravity"], physicsClientId=self.client)
         links = mechanism(model)
         for link, j in zip(links, range(exchange.joints.start, exchange.joints.stop), strict=True):
-            exchange.values[E.ROTOR + j] = link.rotor
+            exchange.lanes.rotor[j] = link.rotor
         self.joints: list[int] = []
         self.bare = self._body(urdf(model, with_event=False))
         self.loaded = self._body(urdf(model, with_event=True)) if f"geometry/{EVENT}" in model.effects else self.bare
-        self.durations, self.shares = exchange.values[E.DURATION], exchange.values[E.LOADED]
+        self.durations, self.shares = exchange.lanes.duration, exchange.lanes.loaded
         self.lanes = [_Lane.of(exchange, lane) for lane in range(lanes)]
         self.still = [0.0] * len(links)
         self.time_step = 0.0
@@ -104,12 +103,11 @@ class BulletWorld:
                     x.mass[:] = (1.0 - share) * np.array(bare[0]) + share * np.array(loaded[0])
                     x.bias[:] = (1.0 - share) * np.array(bare[1]) + share * np.array(loaded[1])
 
-    def _weighed(self, body: int, x: _Lane) -> tuple[list[float], tuple[float, ...]]:
-        """Mass matrix, its lower triangle row by row, and bias forces of a body."""
+    def _weighed(self, body: int, x: _Lane) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
+        """Mass matrix and bias forces of a body."""
         places = x.place.tolist()
         matrix = self.bullet.calculateMassMatrix(body, places, physicsClientId=self.client)
-        lower = [matrix[i][j] for i in range(len(places)) for j in range(i + 1)]
-        return lower, self._forces(body, places, x, self.still)
+        return matrix, self._forces(body, places, x, self.still)
 
     def _forces(self, body: int, places: list[float], x: _Lane, accelerations: list[float]) -> tuple[float, ...]:
         """What moves a body with these accelerations."""

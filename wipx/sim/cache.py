@@ -9,6 +9,7 @@ import ast
 import hashlib
 import os
 import tempfile
+import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -16,10 +17,13 @@ from typing import Any
 
 import numba
 from numba.core import config as numba_settings
+from numba.core.errors import NumbaExperimentalFeatureWarning
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
-COMPILED = ("cached", "law", "inlined")  # decorators
+warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)  # of functions that are given at run time
+FLAGS: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}, "error_model": "numpy"}
+COMPILED = ("cached", "law", "inlined", "part")  # decorators
 
 
 def sources_digest(package: Path) -> str:
@@ -74,10 +78,20 @@ def _cache_folder() -> Path:
     return folder
 
 
-def cached(function):
-    """Compile a kernel, kept on disk for the next run."""
+def _keep_on_disk() -> None:
     if "NUMBA_CACHE_DIR" not in os.environ:
         settings: Any = numba_settings  # its names are made at run time
         settings.CACHE_DIR = str(_cache_folder())
-    flags = {"nsz", "arcp", "contract", "afn", "reassoc"}
-    return numba.njit(fastmath=flags, error_model="numpy", nogil=True, cache=True, boundscheck=False)(function)
+
+
+def cached(function):
+    """Compile a kernel, kept on disk for the next run."""
+    _keep_on_disk()
+    return numba.njit(**FLAGS, nogil=True, cache=True, boundscheck=False)(function)
+
+
+def part(function):
+    """Compile a part that the kernel is given at run time: a function of rows, blocks, lanes in use and flags."""
+    _keep_on_disk()
+    rows, blocks, flags = numba.types.float64[::1], numba.types.float64[:, ::1], numba.types.boolean[::1]
+    return numba.cfunc(numba.types.void(rows, blocks, numba.types.int64, flags), cache=True, **FLAGS)(function)

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.model import ModelBatch
+from wipx.core.plant import Plant
 from wipx.effects.catalogue import kinds
 from wipx.effects.lagged_stribeck import lag_of
 from wipx.effects.payload import loaded
 from wipx.effects.remainder import KNOTS
+from wipx.sim import body as B
 from wipx.sim import rows as R
 
 FASTEST_LAG = 1e-30  # [s]; a lag of zero is one that settles at once
@@ -24,14 +26,18 @@ class Coefficients:
     """What the kernel needs of a batch of models.
 
     Attributes:
-        rows: Coefficients, shape (N_COEFFICIENTS, P).
-        present: Parts of the signal path that are switched on, shape (N_FLAGS,).
-        actuated: Whether each joint has a command, shape (2,).
+        body: What the rows of the whole robot begin with, shape (rows, P).
+        joints: And those of each joint, shape (N, BLOCK, P).
+        on: Parts of the whole robot that are switched on, shape (FLAGS,).
+        has: And of each joint, shape (N, JOINT_FLAGS).
+        parts: Code of the rigid body.
     """
 
-    rows: np.ndarray
-    present: np.ndarray
-    actuated: np.ndarray
+    body: np.ndarray
+    joints: np.ndarray
+    on: np.ndarray
+    has: np.ndarray
+    parts: tuple[object, object, object]
 
 
 class _Filler:
@@ -41,8 +47,10 @@ class _Filler:
         self.batch = batch
         self.effects = batch.model.effects
         self.plant = batch.model.plant
-        self.rows = np.zeros((R.N_COEFFICIENTS, batch.size))
-        self.present = np.zeros(R.N_FLAGS, dtype=np.bool_)
+        self.rows = np.zeros((B.ROWS, batch.size))
+        self.blocks = np.zeros((B.JOINTS, R.BLOCK, batch.size))
+        self.on = np.zeros(R.FLAGS, dtype=np.bool_)
+        self.has = np.zeros((B.JOINTS, R.JOINT_FLAGS), dtype=np.bool_)
 
     def plant_value(self, name: str) -> np.ndarray:
         return self.batch.column(name)
@@ -55,15 +63,20 @@ class _Filler:
         found = {p.name: np.full(self.batch.size, p.default) for p in parameters if p.default is not None}
         return found | {symbol: self.batch.column(f"{name}.{symbol}") for symbol in self.effects[name]}
 
-    def add(self, name: str, flag: int | None, **targets: int) -> None:
-        """Add the parameters of an effect, where present, to rows, and raise its flag."""
+    def add(self, name: str, j: int, **targets: int) -> bool:
+        """Add the parameters of an effect to rows of joint j; whether there is such an effect."""
         values = self.values(name)
-        if values is None:
-            return
-        if flag is not None:
-            self.present[flag] = True
-        for symbol, row in targets.items():
-            self.rows[row] += values[symbol]
+        for symbol, row in targets.items() if values is not None else ():
+            self.blocks[j, row] += values[symbol]
+        return values is not None
+
+    def set(self, name: str, j: int, flag: int, **targets: int) -> bool:
+        """Set rows of joint j to the parameters of an effect and raise its flag; whether there is such an effect."""
+        values = self.values(name)
+        for symbol, row in targets.items() if values is not None else ():
+            self.blocks[j, row] = values[symbol]
+        self.has[j, flag] |= values is not None
+        return values is not None
 
 
 def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coefficients:
@@ -74,59 +87,68 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
         smoothing: Speed over which the dry friction of each joint builds up [m/s, rad/s]; empty for sticking.
     """
     f = _Filler(batch)
-    _set_neutral(f.rows)
     plant = f.plant
-    f.rows[R.INPUT_GAIN] = f.plant_value("input_gain")
+    for block in f.blocks:
+        _set_neutral(block)
+    f.rows[[B.MASS, B.INERTIA]] = 1.0
     if plant.kind == "double_pendulum":
+        body = B.double_body
         _double_pendulum(f)
     else:
+        body = B.wip_body
         _wip_family(f)
-    _environment(f)
-    _actuator(f)
     for site in plant.joints:
-        _joint(f, site, joint_index(site))
+        j = joint_index(plant, site)
+        _joint(f, site, j)
+        _sensor(f, f"sensor_{plant.columns[site]}", j)
+    for site in plant.actuated:
+        _actuator(f, "actuator", joint_index(plant, site))
+    f.has[0, R.ON_SPRING] = f.add("environment/spring", 0, k=R.SPRING, x0=R.SPRING_REST)
     for site, speed in zip(plant.joints, smoothing, strict=False):
-        f.rows[R.SMOOTHING + joint_index(site)] = speed
-        f.present[R.ON_SMOOTHING] = True
-    for site, column in plant.columns.items():
-        _sensor(f, f"sensor_{column}", joint_index(site))
-    actuated = np.zeros(2, dtype=np.bool_)
-    actuated[[joint_index(site) for site in plant.actuated]] = True
-    return Coefficients(f.rows, f.present, actuated)
+        f.blocks[joint_index(plant, site), R.SMOOTHING] = speed
+        f.on[R.ON_SMOOTHING] = True
+    f.on[R.ON_TIME] = f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
+    return Coefficients(f.rows, f.blocks, f.on, f.has, (body, body, body))
 
 
-def joint_index(site: str) -> int:
-    """Row of a joint in the kernel: translation and joint1 are 0, pitch and joint2 are 1."""
+def joint_count(plant: Plant) -> int:
+    """Joints of a plant in the kernel."""
+    return B.JOINTS
+
+
+def joint_index(plant: Plant, site: str) -> int:
+    """Number of a joint in the kernel."""
     return {"translation": 0, "joint1": 0, "pitch": 1, "joint2": 1}[site]
 
 
-def _set_neutral(rows: np.ndarray) -> None:
-    rows[[R.GAIN, R.MASS, R.INERTIA]] = 1.0
-    rows[[R.FORCE_MAX, R.STALL, R.FREE_SPEED]] = 1e9
-    rows[[R.LAG_RATE, R.PAPER_RATE, R.PAPER_RATE1]] = 1.0 / FASTEST_LAG
-    rows[[R.DRIVE_INERTIA, R.STRIBECK_SPEED, R.STRIBECK_SPEED1, R.PEAK_SPEED, R.PEAK_SPEED1]] = 1.0
-    rows[[R.PAPER_SPEED, R.PAPER_SPEED1]] = 1.0
+def _set_neutral(block: np.ndarray) -> None:
+    block[R.GAIN] = 1.0
+    block[[R.FORCE_MAX, R.STALL, R.FREE_SPEED]] = 1e9
+    block[[R.LAG_RATE, R.PAPER_RATE]] = 1.0 / FASTEST_LAG
+    block[[R.DRIVE_INERTIA, R.STRIBECK_SPEED, R.PEAK_SPEED, R.PAPER_SPEED]] = 1.0
 
 
 def _wip_family(f: _Filler) -> None:
     """Contract section 2: wip, and cartpole, pendulum and linear_axis as its special cases."""
     plain = _rigid_body(f, with_event=False)
-    for row, value in zip((R.MASS, R.COUPLING, R.INERTIA, R.GRAVITY), plain[:4], strict=True):
+    for row, value in zip((B.MASS, B.COUPLING, B.INERTIA, B.GRAVITY), plain[:4], strict=True):
         f.rows[row] = value
     event = f.values("geometry/payload_event")
     if event is not None:
-        f.present[R.ON_EVENT] = True
+        f.on[R.ON_EVENT] = True
         loaded_body = _rigid_body(f, with_event=True)
-        deltas = (R.EVENT_MASS, R.EVENT_COUPLING, R.EVENT_INERTIA, R.EVENT_GRAVITY, R.EVENT_WEIGHT)
+        deltas = (B.EVENT_MASS, B.EVENT_COUPLING, B.EVENT_INERTIA, B.EVENT_GRAVITY, B.EVENT_WEIGHT)
         for row, after, before in zip(deltas, loaded_body, plain, strict=True):
             f.rows[row] = after - before
-        f.rows[R.EVENT_TIME] = event["t0"]
-    f.add("geometry/com_offset", None, theta_eq=R.BALANCE)
+        f.rows[B.EVENT_TIME] = event["t0"]
+    balance = f.values("geometry/com_offset")
+    if balance is not None:
+        f.rows[B.BALANCE] = balance["theta_eq"]
     tilt = f.values("environment/rail_tilt")
     if tilt is not None:
-        f.present[R.ON_TILT] = True
-        f.rows[R.TILT] = tilt["angle"]
-        f.rows[R.TILT_FORCE] = plain[4]
+        f.on[R.ON_TILT] = True
+        f.rows[B.TILT] = tilt["angle"]
+        f.rows[B.TILT_FORCE] = plain[4]
 
 
 def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
@@ -164,128 +186,100 @@ def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
 
 def _double_pendulum(f: _Filler) -> None:
     """Double pendulum, theta1 = 0 hanging, theta2 relative to link 1; inertias about the joints."""
-    f.present[R.ON_DOUBLE] = True
     mass1, mass2 = f.plant_value("link1_mass"), f.plant_value("link2_mass")
     length1, com1, com2 = f.plant_value("link1_length"), f.plant_value("link1_com"), f.plant_value("link2_com")
     gravity = f.plant_value("gravity")
-    f.rows[R.DP_ELBOW] = f.plant_value("link2_inertia")
-    f.rows[R.DP_BASE] = f.plant_value("link1_inertia") + mass2 * length1**2 + f.rows[R.DP_ELBOW]
-    f.rows[R.DP_COUPLING] = mass2 * length1 * com2
-    f.rows[R.DP_GRAVITY] = mass2 * com2 * gravity
-    f.rows[R.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
-    f.add("joint1/rotor_inertia", None, J=R.ROTOR)
-    f.add("joint2/rotor_inertia", None, J=R.ROTOR1)
+    f.rows[B.DP_ELBOW] = f.plant_value("link2_inertia")
+    f.rows[B.DP_BASE] = f.plant_value("link1_inertia") + mass2 * length1**2 + f.rows[B.DP_ELBOW]
+    f.rows[B.DP_COUPLING] = mass2 * length1 * com2
+    f.rows[B.DP_GRAVITY] = mass2 * com2 * gravity
+    f.rows[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
+    f.add("joint1/rotor_inertia", 0, J=R.ROTOR)
+    f.add("joint2/rotor_inertia", 1, J=R.ROTOR)
 
 
-def _environment(f: _Filler) -> None:
-    f.add("environment/spring", R.ON_SPRING, k=R.SPRING, x0=R.SPRING_REST)
-
-
-def _actuator(f: _Filler) -> None:
-    f.add("actuator/delay", R.ON_DELAY, tau=R.DELAY)
-    f.add("actuator/offset", R.ON_OFFSET, F_0=R.OFFSET)
-    f.add("actuator/dead_zone", R.ON_DEAD_ZONE, band=R.DEAD_BAND)
-    f.add("actuator/back_emf", R.ON_BACK_EMF, k_e=R.BACK_EMF)
-    f.add("actuator/ripple", R.ON_RIPPLE, A=R.RIPPLE, phase=R.RIPPLE_PHASE)
-    for name, flag, targets in (
-        ("actuator/gain", None, {"k": R.GAIN}),
-        ("actuator/saturation", R.ON_SATURATION, {"F_max": R.FORCE_MAX}),
-        ("actuator/speed_limit", R.ON_SPEED_LIMIT, {"F_stall": R.STALL, "v_free": R.FREE_SPEED}),
-        (
-            "actuator/backlash",
-            R.ON_BACKLASH,
-            {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING, "returned": R.RETURNED},
-        ),
-    ):
-        _replace(f, name, flag, targets)
-    backlash = f.values("actuator/backlash")
-    if backlash is not None:
-        f.rows[R.CONTACT_RATE] = 1.0 / np.maximum(backlash["contact_time"], FASTEST_LAG)
-    lag = f.values("actuator/lag")
-    if lag is not None:
-        f.present[R.ON_LAG] = True
-        f.rows[R.LAG_RATE] = 1.0 / np.maximum(lag["tau"], FASTEST_LAG)
-    ripple = f.values("actuator/ripple")
-    if ripple is not None:
-        has_wheel = "wheel_radius" in f.plant.parameters
-        f.rows[R.RIPPLE_PERIODS] = ripple["n"] / (f.plant_value("wheel_radius") if has_wheel else 1.0)
-
-
-def _replace(f: _Filler, name: str, flag: int | None, targets: dict[str, int]) -> None:
-    values = f.values(name)
-    if values is None:
-        return
-    if flag is not None:
-        f.present[flag] = True
-    for symbol, row in targets.items():
-        f.rows[row] = values[symbol]
+def _actuator(f: _Filler, site: str, j: int) -> None:
+    block = f.blocks[j]
+    f.has[j, R.ACTUATED] = True
+    block[R.INPUT_GAIN] = f.plant_value("input_gain")
+    f.on[R.ON_DELAY] |= f.add(f"{site}/delay", j, tau=R.DELAY)
+    f.set(f"{site}/offset", j, R.ON_OFFSET, F_0=R.OFFSET)
+    f.set(f"{site}/dead_zone", j, R.ON_DEAD_ZONE, band=R.DEAD_BAND)
+    f.set(f"{site}/gain", j, R.ON_GAIN, k=R.GAIN)
+    f.set(f"{site}/saturation", j, R.ON_SATURATION, F_max=R.FORCE_MAX)
+    f.set(f"{site}/speed_limit", j, R.ON_SPEED_LIMIT, F_stall=R.STALL, v_free=R.FREE_SPEED)
+    f.set(f"{site}/back_emf", j, R.ON_BACK_EMF, k_e=R.BACK_EMF)
+    if f.set(f"{site}/lag", j, R.ON_LAG, tau=R.LAG_RATE):
+        block[R.LAG_RATE] = 1.0 / np.maximum(block[R.LAG_RATE], FASTEST_LAG)
+    if f.set(f"{site}/ripple", j, R.ON_RIPPLE, A=R.RIPPLE, phase=R.RIPPLE_PHASE, n=R.RIPPLE_PERIODS):
+        block[R.RIPPLE_PERIODS] /= f.plant_value("wheel_radius") if "wheel_radius" in f.plant.parameters else 1.0
+    gap = {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING, "returned": R.RETURNED}
+    if f.set(f"{site}/backlash", j, R.ON_BACKLASH, **gap, contact_time=R.CONTACT_RATE):
+        block[R.CONTACT_RATE] = 1.0 / np.maximum(block[R.CONTACT_RATE], FASTEST_LAG)
+    f.has[j, R.ON_MEMORY] |= f.has[j, R.ON_LAG] or f.has[j, R.ON_BACKLASH]
 
 
 def _joint(f: _Filler, site: str, j: int) -> None:
-    f.add(f"{site}/viscous", R.ON_DAMPING, sigma=R.VISCOUS + j)
-    f.add(f"{site}/quadratic_drag", R.ON_DRAG + j, c=R.DRAG + j)
+    block, has = f.blocks[j], f.has[j]
+    damped = f.add(f"{site}/viscous", j, sigma=R.VISCOUS)
+    has[R.ON_DRAG] = f.add(f"{site}/quadratic_drag", j, c=R.DRAG)
+    dry = False
     for name, plus, minus in (
         ("coulomb", "F_c", "F_c"),
         ("asymmetric_coulomb", "F_plus", "F_minus"),
         ("stribeck", "F_c", "F_c"),
     ):
-        f.add(f"{site}/{name}", R.ON_FRICTION, **{plus: R.LEVEL_PLUS + j})
-        f.add(f"{site}/{name}", R.ON_FRICTION, **{minus: R.LEVEL_MINUS + j})
-    stribeck = {"F_s": R.STATIC + j, "F_c": R.COULOMB + j, "v_s": R.STRIBECK_SPEED + j}
-    _replace(f, f"{site}/stribeck", R.ON_STRIBECK + j, stribeck)
-    _replace(f, f"{site}/sticky_spot", R.ON_SPOT, {"F_c": R.SPOT, "lo": R.SPOT_LOW, "hi": R.SPOT_HIGH})
-    _replace(
-        f, f"{site}/load_friction", R.ON_LOAD + j, {"K_motor": R.LOAD_MOTOR + j, "K_external": R.LOAD_EXTERNAL + j}
-    )
-    if f.present[[R.ON_SPOT, R.ON_LOAD + j]].any():
-        f.present[R.ON_FRICTION] = True
-    bristle = {"F_c": R.SLIDING + j, "stiffness": R.BRISTLE + j, "damping": R.BRISTLE_DAMPING + j}
-    peak, shape = {"F_s": R.PEAK + j, "v_s": R.PEAK_SPEED + j}, {"n": R.EXPONENT + j, "gamma": R.GAMMA + j}
-    _replace(f, f"{site}/presliding", R.ON_BRISTLE + j, bristle)
-    _replace(f, f"{site}/lugre", R.ON_BRISTLE + j, {**bristle, **peak})
-    _replace(f, f"{site}/hysteresis", R.ON_HYSTERESIS + j, {**bristle, **shape})
-    f.present[R.ON_BRISTLE + j] |= f.present[R.ON_HYSTERESIS + j]
-    if f.present[R.ON_BRISTLE + j]:
-        f.present[R.ON_DAMPING] = True
+        dry |= f.add(f"{site}/{name}", j, **{plus: R.LEVEL_PLUS})
+        dry |= f.add(f"{site}/{name}", j, **{minus: R.LEVEL_MINUS})
+    f.set(f"{site}/stribeck", j, R.ON_STRIBECK, F_s=R.STATIC, F_c=R.COULOMB, v_s=R.STRIBECK_SPEED)
+    dry |= f.set(f"{site}/sticky_spot", j, R.ON_SPOT, F_c=R.SPOT, lo=R.SPOT_LOW, hi=R.SPOT_HIGH)
+    dry |= f.set(f"{site}/load_friction", j, R.ON_LOAD, K_motor=R.LOAD_MOTOR, K_external=R.LOAD_EXTERNAL)
+    bristle = {"F_c": R.SLIDING, "stiffness": R.BRISTLE, "damping": R.BRISTLE_DAMPING}
+    f.set(f"{site}/presliding", j, R.ON_BRISTLE, **bristle)
+    f.set(f"{site}/lugre", j, R.ON_BRISTLE, **bristle, F_s=R.PEAK, v_s=R.PEAK_SPEED)
+    f.set(f"{site}/hysteresis", j, R.ON_HYSTERESIS, **bristle, n=R.EXPONENT, gamma=R.GAMMA)
+    has[R.ON_BRISTLE] |= has[R.ON_HYSTERESIS]
+    if has[R.ON_BRISTLE]:
+        damped = True
         # A bristle without a level slides at once; from rest it would first be a spring.
-        held = np.maximum(f.rows[R.SLIDING + j], f.rows[R.PEAK + j]) > 0.0
-        f.rows[[R.BRISTLE + j, R.BRISTLE_DAMPING + j]] *= held
-    _remainder(f, site, j)
-    swing = f.values(f"{site}/resonance")
-    if swing is not None:
-        f.present[R.ON_SWING + j] = True
-        pulsation = 2.0 * np.pi * swing["f"]
-        f.rows[R.SWING + j] = swing["m"]
-        f.rows[R.SWING_STIFFNESS + j] = pulsation**2
-        f.rows[R.SWING_DAMPING + j] = 2.0 * swing["zeta"] * pulsation
-    paper = f.values(f"{site}/lagged_stribeck")
-    if paper is not None:
-        f.present[R.ON_PAPER + j] = True
-        for symbol, row in (
-            ("F_s", R.PAPER_STATIC),
-            ("F_c", R.PAPER_COULOMB),
-            ("v_s", R.PAPER_SPEED),
-            ("sigma", R.PAPER_VISCOUS),
-            ("epsilon", R.PAPER_EPSILON),
-        ):
-            f.rows[row + j] = paper[symbol]
-        f.rows[R.PAPER_RATE + j] = 1.0 / np.maximum(lag_of(paper["alpha"]), FASTEST_LAG)
-
-
-def _remainder(f: _Filler, site: str, j: int) -> None:
+        held = np.maximum(block[R.SLIDING], block[R.PEAK]) > 0.0
+        block[[R.BRISTLE, R.BRISTLE_DAMPING]] *= held
     values = f.values(f"{site}/remainder")
-    if values is None:
-        return
-    f.present[R.ON_REMAINDER + j] = True
+    if values is not None:
+        dry |= bool(np.any(values["factor"] < 0.0))
+        _remainder(f, values, j)
+    if f.set(f"{site}/resonance", j, R.ON_SWING, m=R.SWING, f=R.SWING_STIFFNESS, zeta=R.SWING_DAMPING):
+        pulsation = 2.0 * np.pi * block[R.SWING_STIFFNESS]
+        block[R.SWING_STIFFNESS] = pulsation**2
+        block[R.SWING_DAMPING] *= 2.0 * pulsation
+    paper = {
+        "F_s": R.PAPER_STATIC,
+        "F_c": R.PAPER_COULOMB,
+        "v_s": R.PAPER_SPEED,
+        "sigma": R.PAPER_VISCOUS,
+        "epsilon": R.PAPER_EPSILON,
+        "alpha": R.PAPER_RATE,
+    }
+    if f.set(f"{site}/lagged_stribeck", j, R.ON_PAPER, **paper):
+        block[R.PAPER_RATE] = 1.0 / np.maximum(lag_of(block[R.PAPER_RATE]), FASTEST_LAG)
+    laws = [R.ON_DRAG, R.ON_STRIBECK, R.ON_SPOT, R.ON_LOAD, R.ON_BRISTLE, R.ON_PAPER, R.ON_REMAINDER, R.ON_SWING]
+    has[R.ON_LAWS] = has[laws].any()
+    has[R.ON_MEMORY] |= has[R.ON_PAPER]
+    f.on[R.ON_DAMPING] |= damped
+    f.on[R.ON_FRICTION] |= dry
+
+
+def _remainder(f: _Filler, values: dict[str, np.ndarray], j: int) -> None:
+    block = f.blocks[j]
+    f.has[j, R.ON_REMAINDER] = True
     for symbol, row in (("signal", R.REMAINDER_SIGNAL), ("factor", R.REMAINDER_FACTOR), ("low", R.REMAINDER_LOW)):
-        f.rows[row + j] = values[symbol]
-    f.present[R.ON_FRICTION] |= bool(np.any(values["factor"] < 0.0))
-    f.rows[R.REMAINDER_PER_UNIT + j] = (KNOTS - 1) / np.maximum(values["high"] - values["low"], 1e-12)
+        block[row] = values[symbol]
+    block[R.REMAINDER_PER_UNIT] = (KNOTS - 1) / np.maximum(values["high"] - values["low"], 1e-12)
     for i in range(KNOTS):
-        f.rows[R.REMAINDER + 2 * i + j] = values[f"f{i}"]
+        block[R.REMAINDER + i] = values[f"f{i}"]
 
 
 def _sensor(f: _Filler, site: str, j: int) -> None:
-    f.add(f"{site}/bias", None, b=R.BIAS + j)
-    f.add(f"{site}/scale", None, e=R.SCALE + j)
-    f.add(f"{site}/delay", R.ON_SENSOR_DELAY, tau=R.SENSOR_DELAY + j)
+    f.add(f"{site}/bias", j, b=R.BIAS)
+    f.add(f"{site}/scale", j, e=R.SCALE)
+    f.on[R.ON_SENSOR_DELAY] |= f.add(f"{site}/delay", j, tau=R.SENSOR_DELAY)

@@ -7,30 +7,32 @@ step, half a step of whose drift is taken back: together that is the kernel's po
 """
 
 from wipx.core.law import law
-from wipx.sim import exchange as E
 from wipx.sim import rows as R
 from wipx.sim.body import share_after
 from wipx.sim.cache import cached
 from wipx.sim.kernel import begin_row, replay, respond, set_step, step
 from wipx.sim.rows import W
 from wipx.sim.sensors import feedback, guide, record
+from wipx.sim.sticking import row_of
 
 LOST = 1e6  # [m, rad, m/s, rad/s]; beyond it a rollout has fallen over, and the engine is spared it
 
 
 @cached
-def show(S, n, on, past, t_rows, lanes, k, out, lane0, count, path, until):
+def show(B, n, on, past, t_rows, lanes, k, out, lane0, count, path, until):
     """Put the state where a path leads, if one does, and write what the sensors show at row k."""
     if k < len(path):
-        guide(S, lanes, k, lane0, count, path, until)
-    record(S, n, on, past, t_rows, lanes, k, out, lane0, count)
+        guide(B, lanes, k, lane0, count, path, until)
+    record(B, n, on, past, t_rows, lanes, k, out, lane0, count)
 
 
 @cached
 def begin(
     S,
+    B,
     n,
     on,
+    has,
     t_rows,
     u_rows,
     ramps,
@@ -38,7 +40,6 @@ def begin(
     substeps,
     lanes,
     counts,
-    actuated,
     k,
     lane0,
     count,
@@ -50,10 +51,10 @@ def begin(
 ):
     """Load commands and steps of row k, which was shown; the smallest and the largest number of steps."""
     if closed:
-        feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
+        feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
     else:
-        replay(S, n, on, u_rows, ramps, lanes, actuated, k)
-    least, most = begin_row(S, n, on, t_rows, row_steps, substeps, lanes, counts, k)
+        replay(B, n, on, has, u_rows, ramps, lanes, k)
+    least, most = begin_row(S, B, n, on, has, t_rows, row_steps, substeps, lanes, counts, k)
     if count < n:
         for w in range(count, n):
             counts[w] = 0
@@ -62,57 +63,63 @@ def begin(
 
 
 @cached
-def before(S, n, X, on, t_rows, u_rows, ramps, lanes, pointers, actuated, counts, least, s):
-    """Step s of a row up to the forces that act in mid-step, and where the engine is to stand (rows of `exchange`)."""
+def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, parts):
+    """Step s of a row up to the forces that act in mid-step, and where the engine is to stand."""
     if s == 0 or s >= least:
-        set_step(S, n, on, counts, s)
-    step(S, n, on, t_rows, u_rows, ramps, lanes, pointers, actuated)
+        set_step(S, B, n, has, counts, s)
+    step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, parts)
     for w in range(n):
-        place, place1 = S[R.MID * W + w], S[R.MID1 * W + w]
-        speed, speed1 = S[R.RATE * W + w], S[R.RATE1 * W + w]
-        found = abs(place) < LOST and abs(place1) < LOST and abs(speed) < LOST and abs(speed1) < LOST
-        X[E.DURATION, w] = S[R.STEP * W + w] if found else 0.0
-        X[E.PLACE, w], X[E.PLACE1, w] = place, place1
-        X[E.SPEED, w], X[E.SPEED1, w] = speed, speed1
+        X.duration[w] = S[R.STEP * W + w]
+    for j in range(len(has)):
+        J = B[j]
+        for w in range(n):
+            place, speed = J[R.MID * W + w], J[R.RATE * W + w]
+            X.place[j, w], X.speed[j, w] = place, speed
+            if not (abs(place) < LOST and abs(speed) < LOST):
+                X.duration[w] = 0.0
     if on[R.ON_EVENT]:
         for w in range(n):
-            X[E.LOADED, w] = share_after(S, w)
+            X.loaded[w] = share_after(S, w)
 
 
 @cached
-def between(S, n, X, on):
+def between(S, B, n, X, on, has, parts):
     """The rates at the end of the step from the engine's mass matrix and bias, and the force that leads there."""
-    for w in range(n):
-        S[R.M11 * W + w] = X[E.MASS11, w] + X[E.ROTOR, w]
-        S[R.M12 * W + w] = X[E.MASS12, w]
-        S[R.M22 * W + w] = X[E.MASS22, w] + X[E.ROTOR1, w]
-        S[R.FORCE * W + w] -= X[E.BIAS, w]
-        S[R.FORCE1 * W + w] -= X[E.BIAS1, w]
-    respond(S, n, on)
-    for w in range(n):
-        per_step = S[R.PER_STEP * W + w]
-        a0 = (S[R.V * W + w] - X[E.SPEED, w]) * per_step
-        a1 = (S[R.V1 * W + w] - X[E.SPEED1, w]) * per_step
-        X[E.GAINED, w], X[E.GAINED1, w] = a0, a1
-        X[E.PUSH, w] = X[E.MASS11, w] * a0 + X[E.MASS12, w] * a1 + X[E.BIAS, w]
-        X[E.PUSH1, w] = X[E.MASS12, w] * a0 + X[E.MASS22, w] * a1 + X[E.BIAS1, w]
+    joints = len(has)
+    for i in range(joints):
+        J = B[i]
+        for j in range(i + 1):
+            for w in range(n):
+                S[row_of(i, j) * W + w] = X.mass[i, j, w] + (X.rotor[i, w] if i == j else 0.0)
+        for w in range(n):
+            J[R.FORCE * W + w] -= X.bias[i, w]
+    respond(S, B, n, on, has, parts)
+    for i in range(joints):
+        J = B[i]
+        for w in range(n):
+            X.gained[i, w] = (J[R.V * W + w] - X.speed[i, w]) * S[R.PER_STEP * W + w]
+            X.push[i, w] = X.bias[i, w]
+    for i in range(joints):
+        for j in range(joints):
+            for w in range(n):
+                X.push[i, w] += X.mass[max(i, j), min(i, j), w] * X.gained[j, w]
 
 
 @law
 def lost(S, X, w):
     """Whether lane w has a step and the engine did not take it."""
-    return S[R.STEP * W + w] > 0.0 and not X[E.DURATION, w] > 0.0
+    return S[R.STEP * W + w] > 0.0 and not X.duration[w] > 0.0
 
 
 @cached
-def after(S, n, X):
+def after(S, B, n, X):
     """Take over where the engine stands after its step."""
-    for w in range(n):
-        h = X[E.DURATION, w]
-        if h > 0.0:
-            S[R.V * W + w], S[R.V1 * W + w] = X[E.SPEED, w], X[E.SPEED1, w]
-            S[R.Q * W + w] = X[E.PLACE, w] - 0.5 * h * X[E.SPEED, w]
-            S[R.Q1 * W + w] = X[E.PLACE1, w] - 0.5 * h * X[E.SPEED1, w]
-        elif lost(S, X, w):
-            for j in range(2):
-                S[(R.Q + j) * W + w] = S[(R.V + j) * W + w] = float("nan")
+    for j in range(len(X.place)):
+        J = B[j]
+        for w in range(n):
+            h = X.duration[w]
+            if h > 0.0:
+                J[R.V * W + w] = X.speed[j, w]
+                J[R.Q * W + w] = X.place[j, w] - 0.5 * h * X.speed[j, w]
+            elif lost(S, X, w):
+                J[R.Q * W + w] = J[R.V * W + w] = float("nan")

@@ -1,48 +1,62 @@
 """What the laws around a rigid body and the engine that moves it tell each other in a step."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from wipx.sim.rows import W
 
-# Rows; a pair belongs to joints 0 and 1.
-(
-    PLACE, PLACE1, SPEED, SPEED1,  # where the engine stands: in mid-step, later at the next one
-    MASS11, MASS12, MASS22,  # the engine's mass matrix there
-    BIAS, BIAS1,  # Coriolis, centrifugal and gravity forces there, on the side of M v'
-    ROTOR, ROTOR1,  # inertia at the joints that the engine's bodies lack
-    GAINED, GAINED1,  # accelerations over the step that it is to come to,
-    PUSH, PUSH1,  # and the generalised forces that bring it there
-    DURATION,  # of the step; 0 where a lane pauses
-    LOADED,  # share of the payload event's mass that is on the body
-    N_ROWS,
-) = range(18)  # fmt: skip
 
+class Lanes(NamedTuple):
+    """Up to `W` lanes of one model with N joints, side by side, as the compiled code takes them.
 
-def _empty() -> np.ndarray:
-    values = np.zeros((N_ROWS, W))
-    values[[MASS11, MASS22]] = 1.0  # of a joint that the plant lacks
-    return values
+    Attributes:
+        place: Where the engine stands: in mid-step, later at the next one, shape (N, W).
+        speed: Likewise.
+        mass: The engine's mass matrix there, shape (N, N, W); only the lower triangle counts.
+        bias: Coriolis, centrifugal and gravity forces there, on the side of M v', shape (N, W).
+        rotor: Inertia at the joints that the engine's bodies lack, shape (N, W).
+        gained: Accelerations over the step that the engine is to come to, shape (N, W).
+        push: Generalised forces that bring it there, shape (N, W).
+        duration: Of the step; 0 where a lane pauses, shape (W,).
+        loaded: Share of the payload event's mass that is on the body, shape (W,).
+    """
+
+    place: np.ndarray
+    speed: np.ndarray
+    mass: np.ndarray
+    bias: np.ndarray
+    rotor: np.ndarray
+    gained: np.ndarray
+    push: np.ndarray
+    duration: np.ndarray
+    loaded: np.ndarray
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Up to `W` lanes of one model, side by side.
+    """Lanes of one model.
 
     Attributes:
-        joints: Rows of the plant's joints among two.
-        values: Shape (N_ROWS, W).
+        joints: The plant's joints among those of the compiled code.
+        lanes: All of them.
     """
 
     joints: slice
-    values: np.ndarray = field(default_factory=_empty)
+    lanes: Lanes
 
-    def of(self, row: int, lane: int) -> np.ndarray:
-        """What `lane` has of a pair of rows, a view of shape (joints,)."""
-        return self.values[row + self.joints.start : row + self.joints.stop, lane]
+    @classmethod
+    def of(cls, joints: slice, width: int) -> "Exchange":
+        """An exchange for a plant whose `joints` are some of `width`."""
+        place, speed, bias, rotor, gained, push = (np.zeros((width, W)) for _ in range(6))
+        mass = np.repeat(np.eye(width)[..., None], W, axis=2)  # 1 for a joint that the plant lacks
+        return cls(joints, Lanes(place, speed, mass, bias, rotor, gained, push, np.zeros(W), np.zeros(W)))
+
+    def joint(self, name: str, lane: int) -> np.ndarray:
+        """What `lane` has of a quantity of the joints, a view of shape (joints,)."""
+        return getattr(self.lanes, name)[self.joints, lane]
 
     def mass(self, lane: int) -> np.ndarray:
-        """Lower triangle of a lane's mass matrix row by row, a view of shape (1,) or (3,)."""
-        first, last = 2 * self.joints.start, 2 * self.joints.stop - 1
-        return self.values[MASS11 + first : MASS11 + last, lane]
+        """A lane's mass matrix, a view of shape (joints, joints)."""
+        return self.lanes.mass[self.joints, self.joints, lane]

@@ -8,7 +8,6 @@ import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model, ModelBatch
-from wipx.sim import exchange as E
 from wipx.sim import mujoco_batch
 from wipx.sim.exchange import Exchange
 from wipx.sim.inputs import Inputs
@@ -65,7 +64,6 @@ class _Lane:
     data: Any
     qpos: np.ndarray
     qvel: np.ndarray
-    inertia: np.ndarray
     bias: np.ndarray
     applied: np.ndarray
     place: np.ndarray
@@ -80,14 +78,13 @@ class _Lane:
             data,
             data.qpos,
             data.qvel,
-            data.M,
             data.qfrc_bias,
             data.qfrc_applied,
-            exchange.of(E.PLACE, lane),
-            exchange.of(E.SPEED, lane),
+            exchange.joint("place", lane),
+            exchange.joint("speed", lane),
             exchange.mass(lane),
-            exchange.of(E.BIAS, lane),
-            exchange.of(E.PUSH, lane),
+            exchange.joint("bias", lane),
+            exchange.joint("push", lane),
         )
 
 
@@ -101,9 +98,9 @@ class MujocoWorld:
     def load(self, model: Model, exchange: Exchange, lanes: int) -> None:
         """See `World`."""
         self.model = self.mujoco.MjModel.from_xml_string(mjcf(model, self.step))
-        self.durations = exchange.values[E.DURATION]
-        self.loaded = exchange.values[E.LOADED]
+        self.durations, self.loaded = exchange.lanes.duration, exchange.lanes.loaded
         self.lanes = [_Lane.of(self.mujoco.MjData(self.model), exchange, lane) for lane in range(lanes)]
+        self.mass = np.zeros((self.model.nv, self.model.nv))
         self.time_step = self.step
         self.payload = model.effects[f"geometry/{EVENT}"]["mass"] if f"geometry/{EVENT}" in model.effects else None
 
@@ -113,7 +110,7 @@ class MujocoWorld:
 
     def weigh(self) -> None:
         """See `World`."""
-        copy, step1 = np.copyto, self.mujoco.mj_step1
+        copy, step1, full_mass = np.copyto, self.mujoco.mj_step1, self.mujoco.mj_fullM
         for lane, x in enumerate(self.lanes):
             if self.durations[lane] > 0.0:
                 if self.payload is not None:
@@ -122,7 +119,8 @@ class MujocoWorld:
                 copy(x.qpos, x.place)
                 copy(x.qvel, x.speed)
                 step1(self.model, x.data)
-                copy(x.mass, x.inertia)
+                full_mass(self.model, x.data, self.mass)
+                copy(x.mass, self.mass)
                 copy(x.held, x.bias)
 
     def advance(self) -> None:

@@ -22,7 +22,7 @@ from wipx.sim.stepped import single
 LONGER = 4.0  # steps of the loop in one
 EVEN = 1e-9  # relative spread of the steps of a window that counts as even
 BLOCK = 256  # rollouts held in memory at once
-RIGID = (R.ON_DOUBLE, R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
+RIGID = (R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
 
 
 def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) -> bool:
@@ -34,9 +34,10 @@ def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) 
         initial: Shape (2 joints, P, R).
         step: Longest step of the loop [s].
     """
-    present = coefficients(batch).present.copy()
-    present[list(RIGID)] = False
-    if present.any() or inputs.ramps is not None or not np.isfinite(initial).all():
+    known = coefficients(batch)
+    on, has = known.on.copy(), known.has.copy()
+    on[list(RIGID)] = has[:, R.ACTUATED] = False
+    if on.any() or has.any() or inputs.ramps is not None or not np.isfinite(initial).all():
         return False
     return _Steps.of(inputs, step).even
 
@@ -78,14 +79,16 @@ def replay(mujoco: Any, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, 
     """
     layout = Layout(batch.model.plant, batch.size, inputs)
     steps = _Steps.of(inputs, step)
-    rows = coefficients(batch).rows
-    forces = layout.recorded()[:, layout.joints, None] * (rows[R.INPUT_GAIN] * rows[R.GAIN])[:, None]
-    starts = layout.states(initial)[layout.pattern].T
+    blocks = coefficients(batch).joints
+    gains = blocks[layout.joints, R.INPUT_GAIN] * blocks[layout.joints, R.GAIN]
+    forces = layout.recorded()[:, layout.joints, None] * gains[:, :, None]
+    states = layout.states(initial)[layout.joints]
+    starts = np.concatenate([states[:, R.Q], states[:, R.V]]).T
     ends = np.concatenate([np.zeros((1, inputs.windows), dtype=int), np.cumsum(steps.counts, axis=0)])
     models = _models(mujoco, batch, steps)
     data = mujoco.MjData(models[0])
     run = importlib.import_module("mujoco.rollout").rollout
-    out = np.zeros((layout.rows + 1, 4, layout.lanes))
+    out = np.zeros((layout.rows + 1, 2 * layout.width, layout.lanes))
     for begin in range(0, layout.lanes, BLOCK):
         lanes = range(begin, min(begin + BLOCK, layout.lanes))
         control = np.zeros((len(lanes), max(1, int(ends[-1].max())), forces.shape[1]))
@@ -98,8 +101,8 @@ def replay(mujoco: Any, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, 
         course = np.concatenate([start[:, None], course], axis=1)[:, :, 1:]
         for i, lane in enumerate(lanes):
             out[:, layout.pattern, lane] = course[i, ends[:, lane % inputs.windows]]
-    for j in range(2):
-        scale, bias = (np.repeat(rows[row + j], inputs.windows) for row in (R.SCALE, R.BIAS))
+    for j in range(layout.width):
+        scale, bias = (np.repeat(blocks[j, row], inputs.windows) for row in (R.SCALE, R.BIAS))
         out[:, j] = (1.0 + scale) * out[:, j] + bias
     return layout.rollouts(out, inputs.commands[:, :, None, :])
 

@@ -8,6 +8,7 @@ from wipx.sim.rows import W
 @law
 def interpolate(past, t_rows, window, k, j, lane, moment):
     """Coordinate j at a `moment` up to row k: cubic Hermite between rows; held before the first."""
+    joints = past.shape[1] // 2
     i = k - 1
     while i > 0 and t_rows[i, window] > moment:
         i -= 1
@@ -18,122 +19,133 @@ def interpolate(past, t_rows, window, k, j, lane, moment):
         return past[i + 1, j, lane]
     x = minimum(maximum((moment - t_rows[i, window]) / h, 0.0), 1.0)
     a, b = past[i, j, lane], past[i + 1, j, lane]
-    da, db = h * past[i, 2 + j, lane], h * past[i + 1, 2 + j, lane]
+    da, db = h * past[i, joints + j, lane], h * past[i + 1, joints + j, lane]
     c = b - a
     return a + x * (da + x * ((3.0 * c - 2.0 * da - db) + x * (da + db - 2.0 * c)))
 
 
 @law
-def record(S, n, on, past, t_rows, lanes, k, out, lane0, count):
+def record(B, n, on, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
-    for j in range(2):
+    joints = out.shape[1] // 2
+    for j in range(joints):
+        J = B[j]
         for w in range(n):
-            true = S[(R.Q + j) * W + w]
-            S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * true + S[(R.BIAS + j) * W + w]
-    if on[R.ON_SENSOR_DELAY]:
-        for j in range(2):
+            J[R.SHOWN * W + w] = (1.0 + J[R.SCALE * W + w]) * J[R.Q * W + w] + J[R.BIAS * W + w]
+        if on[R.ON_SENSOR_DELAY]:
             for w in range(count):
-                past[k, j, lane0 + w] = S[(R.Q + j) * W + w]
-                past[k, 2 + j, lane0 + w] = S[(R.V + j) * W + w]
-                moment = t_rows[k, lanes[0, w]] - S[(R.SENSOR_DELAY + j) * W + w]
+                past[k, j, lane0 + w] = J[R.Q * W + w]
+                past[k, joints + j, lane0 + w] = J[R.V * W + w]
+                moment = t_rows[k, lanes[0, w]] - J[R.SENSOR_DELAY * W + w]
                 late = interpolate(past, t_rows, lanes[0, w], k, j, lane0 + w, moment)
-                S[(R.SHOWN + j) * W + w] = (1.0 + S[(R.SCALE + j) * W + w]) * late + S[(R.BIAS + j) * W + w]
-    for j in range(2):
-        out[k, j, lane0 : lane0 + count] = S[(R.SHOWN + j) * W : (R.SHOWN + j) * W + count]
-        out[k, 2 + j, lane0 : lane0 + count] = S[(R.V + j) * W : (R.V + j) * W + count]
+                J[R.SHOWN * W + w] = (1.0 + J[R.SCALE * W + w]) * late + J[R.BIAS * W + w]
+        out[k, j, lane0 : lane0 + count] = J[R.SHOWN * W : R.SHOWN * W + count]
+        out[k, joints + j, lane0 : lane0 + count] = J[R.V * W : R.V * W + count]
 
 
 @law
-def feedback(S, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
+def feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings):
     """State feedback u = -K (y - y_ref) on what the sensors show, at the rows of the log."""
     smoothing, limit = settings[0], settings[1]
-    for i in range(4):
-        S[(R.NOISE + i) * W : (R.NOISE + i) * W + count] = noise[k, i, lane0 : lane0 + count]
-        reference = references[k, i]
-        for w in range(n):
-            S[(R.REFERENCE + i) * W + w] = reference[lanes[0, w]]
-    if smoothing >= 0.0:  # rates from differences of the coordinates, through a low-pass
+    joints = len(gains)
+    for j in range(joints):
+        J = B[j]
+        J[R.NOISE * W : R.NOISE * W + count] = noise[k, j, lane0 : lane0 + count]
+        J[R.NOISE_RATE * W : R.NOISE_RATE * W + count] = noise[k, joints + j, lane0 : lane0 + count]
         for w in range(n):
             window = lanes[0, w]
-            S[R.TIME * W + w] = t_rows[k, window] - t_rows[max(k, 1) - 1, window]
-    for j in range(2):
+            J[R.REFERENCE * W + w] = references[k, j, window]
+            J[R.REFERENCE_RATE * W + w] = references[k, joints + j, window]
         if smoothing < 0.0:
             for w in range(n):
-                S[(R.MEASURED_RATE + j) * W + w] = S[(R.V + j) * W + w] + S[(R.NOISE_RATE + j) * W + w]
-        else:
+                J[R.MEASURED_RATE * W + w] = J[R.V * W + w] + J[R.NOISE_RATE * W + w]
+        else:  # rates from differences of the coordinates, through a low-pass
             for w in range(n):
-                dt = S[R.TIME * W + w]
-                moved = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w] - S[(R.MEASURED + j) * W + w]
-                rate = S[(R.MEASURED_RATE + j) * W + w]
+                window = lanes[0, w]
+                dt = t_rows[k, window] - t_rows[max(k, 1) - 1, window]
+                moved = J[R.SHOWN * W + w] + J[R.NOISE * W + w] - J[R.MEASURED * W + w]
+                rate = J[R.MEASURED_RATE * W + w]
                 filtered = rate + (moved - rate * dt) / (dt + smoothing)
-                S[(R.MEASURED_RATE + j) * W + w] = filtered if k > 0 else 0.0
+                J[R.MEASURED_RATE * W + w] = filtered if k > 0 else 0.0
         for w in range(n):
-            S[(R.MEASURED + j) * W + w] = S[(R.SHOWN + j) * W + w] + S[(R.NOISE + j) * W + w]
-    for c in range(2):
-        k0, k1, k2, k3 = gains[c, 0], gains[c, 1], gains[c, 2], gains[c, 3]
+            J[R.MEASURED * W + w] = J[R.SHOWN * W + w] + J[R.NOISE * W + w]
+    for c in range(joints):
+        C = B[c]
         for w in range(n):
-            u = -k0 * (S[R.MEASURED * W + w] - S[R.REFERENCE * W + w])
-            u -= k1 * (S[R.MEASURED1 * W + w] - S[R.REFERENCE1 * W + w])
-            u -= k2 * (S[R.MEASURED_RATE * W + w] - S[R.REFERENCE_RATE * W + w])
-            u -= k3 * (S[R.MEASURED_RATE1 * W + w] - S[R.REFERENCE_RATE1 * W + w])
-            S[(R.COMMAND + c) * W + w] = clip(u, -limit, limit)
-        u_rows[k, c, lane0 : lane0 + count] = S[(R.COMMAND + c) * W : (R.COMMAND + c) * W + count]
+            C[R.COMMAND * W + w] = 0.0
+        for j in range(joints):
+            J = B[j]
+            place, rate = gains[c, j], gains[c, joints + j]
+            for w in range(n):
+                off = place * (J[R.MEASURED * W + w] - J[R.REFERENCE * W + w])
+                C[R.COMMAND * W + w] -= off + rate * (J[R.MEASURED_RATE * W + w] - J[R.REFERENCE_RATE * W + w])
+        for w in range(n):
+            C[R.COMMAND * W + w] = clip(C[R.COMMAND * W + w], -limit, limit)
+        u_rows[k, c, lane0 : lane0 + count] = C[R.COMMAND * W : R.COMMAND * W + count]
 
 
 @law
-def correct(S, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift, group, counts):
+def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift, group, counts):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
-    `measured` has coordinates and rates, shape (K + 1, 4, R); `gains` the shape (groups, K + 1, R, 4 states,
-    4 channels), zero where nothing was measured; `group` says which of them each model has. `drift` has the gains of
-    an acceleration that acts on each joint besides, shape (groups, K + 1, R, 2, 4), or (1, 1, 1, 2, 4) without one:
-    what it does until the next row is added at once.
+    `measured` has coordinates and rates of N joints, shape (K + 1, 2 N, R); `gains` the shape (groups, K + 1, R, 2 N
+    states, 2 N channels), zero where nothing was measured; `group` says which of them each model has. `drift` has the
+    gains of an acceleration that acts on each joint besides, shape (groups, K + 1, R, N, 2 N), or (1, 1, 1, N, 2 N)
+    without one: what it does until the next row is added at once.
     """
-    windows = measured.shape[2]
+    windows, joints = measured.shape[2], measured.shape[1] // 2
+    drifts = drift.shape[1] > 1
     for w in range(count):
         window = lanes[0, w]
         gain = gains[group[(lane0 + w) // windows], k, window]
-        e0 = measured[k, 0, window] - S[R.SHOWN * W + w]
-        e1 = measured[k, 1, window] - S[R.SHOWN1 * W + w]
-        e2 = measured[k, 2, window] - S[R.V * W + w]
-        e3 = measured[k, 3, window] - S[R.V1 * W + w]
-        for j in range(2):
-            way = gain[j, 0] * e0 + gain[j, 1] * e1 + gain[j, 2] * e2 + gain[j, 3] * e3
-            rate = gain[2 + j, 0] * e0 + gain[2 + j, 1] * e1 + gain[2 + j, 2] * e2 + gain[2 + j, 3] * e3
-            S[(R.Q + j) * W + w] += way
-            S[(R.V + j) * W + w] += rate
+        for i in range(joints):
+            J = B[i]
+            J[R.NEXT * W + w] = measured[k, i, window] - J[R.SHOWN * W + w]
+            J[R.RIGHT * W + w] = measured[k, joints + i, window] - J[R.V * W + w]
+        for j in range(joints):
+            J = B[j]
+            way, rate, extra = 0.0, 0.0, 0.0
+            for i in range(joints):
+                place, speed = B[i, R.NEXT * W + w], B[i, R.RIGHT * W + w]
+                way += gain[j, i] * place + gain[j, joints + i] * speed
+                rate += gain[joints + j, i] * place + gain[joints + j, joints + i] * speed
+                if drifts and counts[w] > 0:
+                    own = drift[group[(lane0 + w) // windows], k, window]
+                    extra += own[j, i] * place + own[j, joints + i] * speed
+            J[R.Q * W + w] += way
+            J[R.V * W + w] += rate
             if on[R.ON_SENSOR_DELAY]:
-                correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, S[(R.SENSOR_DELAY + j) * W + w])
-        if drift.shape[1] > 1 and counts[w] > 0:
-            own = drift[group[(lane0 + w) // windows], k, window]
-            dt = t_rows[k + 1, window] - t_rows[k, window]
-            for j in range(2):
-                S[(R.EXTRA + j) * W + w] += own[j, 0] * e0 + own[j, 1] * e1 + own[j, 2] * e2 + own[j, 3] * e3
-                S[(R.Q + j) * W + w] -= 0.5 * S[(R.EXTRA + j) * W + w] * dt**2  # the rate below drifts on by twice this
-                S[(R.V + j) * W + w] += S[(R.EXTRA + j) * W + w] * dt
+                correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, J[R.SENSOR_DELAY * W + w])
+            if drifts and counts[w] > 0:
+                dt = t_rows[k + 1, window] - t_rows[k, window]
+                J[R.EXTRA * W + w] += extra
+                J[R.Q * W + w] -= 0.5 * J[R.EXTRA * W + w] * dt**2  # the rate below drifts on by twice this
+                J[R.V * W + w] += J[R.EXTRA * W + w] * dt
 
 
 @law
-def guide(S, lanes, k, lane0, count, path, until):
+def guide(B, lanes, k, lane0, count, path, until):
     """Put the state where a path leads, at the rows up to `until` (R,) of each window.
 
-    The path has the shape (rows, 4, R) if all models share it, else (rows, 4, P R).
+    The path has the shape (rows, 2 N, R) if all models share it, else (rows, 2 N, P R).
     """
-    size = path.shape[2]
+    size, joints = path.shape[2], path.shape[1] // 2
     for w in range(count):
         if k <= until[lanes[0, w]]:
-            for i in range(4):
-                S[(R.Q + i) * W + w] = path[k, i, (lane0 + w) % size]
+            for j in range(joints):
+                B[j, R.Q * W + w] = path[k, j, (lane0 + w) % size]
+                B[j, R.V * W + w] = path[k, joints + j, (lane0 + w) % size]
 
 
 @law
 def correct_past(past, t_rows, window, k, j, lane, way, rate, delay):
     """Move the course of coordinate j too, as far back as its sensor still shows it."""
+    joints = past.shape[1] // 2
     i = k
     while i >= 0:
         ago = t_rows[k, window] - t_rows[i, window]
         past[i, j, lane] += way - ago * rate
-        past[i, 2 + j, lane] += rate
+        past[i, joints + j, lane] += rate
         if ago > delay:
             break
         i -= 1

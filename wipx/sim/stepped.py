@@ -19,7 +19,7 @@ from wipx.sim.coupling import after, before, begin, between, show
 from wipx.sim.exchange import Exchange
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import filled
-from wipx.sim.layout import HELD, OPEN, ClosedLoop, Layout
+from wipx.sim.layout import ClosedLoop, Layout
 from wipx.sim.mechanism import check_possible
 from wipx.sim.rows import W
 from wipx.sim.simulator import Path, Rollouts, StateFeedback
@@ -109,7 +109,7 @@ class SteppedSimulator(ABC):
     ) -> Rollouts:
         """Closed loop: the feedback computes the command at every row; see `Simulator.close_loop`."""
         run = _Run(self, batch, inputs)
-        commands = np.zeros((run.layout.rows, 2, run.layout.lanes))
+        commands = np.zeros((run.layout.rows, run.layout.width, run.layout.lanes))
         out = run.advance(initial, commands, loop=run.layout.loop(feedback, references, noise))
         return run.layout.rollouts(out, run.layout.per_command(commands))
 
@@ -118,7 +118,7 @@ class SteppedSimulator(ABC):
     ) -> Rollouts:
         """Closed loop with any controller, one row at a time; see `Simulator.drive`."""
         run = _Run(self, ModelBatch(model), inputs)
-        commands = np.zeros((run.layout.rows, 2, 1))
+        commands = np.zeros((run.layout.rows, run.layout.width, 1))
         out = run.advance(initial[:, None, None], commands, controller=controller)
         return run.layout.rollouts(out, run.layout.per_command(commands))
 
@@ -129,16 +129,18 @@ class _Block:
 
     Attributes:
         exchange: Between the laws and the engine.
-        rows: Coefficients, states and scratch, shape (N_ROWS, W).
+        body: Rows of the whole robot, shape (rows W,).
+        joints: Rows of each joint, shape (N, BLOCK W).
         lanes: Window and column of the commands of every lane, shape (2, W).
-        pointers: Row whose command is just leaving the transport delay, shape (W,).
+        pointers: Row whose command is just leaving the transport delay, by joint, shape (N, W).
         counts: Steps of the present row, shape (W,).
         first: Lane of the first among all.
         count: How many there are.
     """
 
     exchange: Exchange
-    rows: np.ndarray
+    body: np.ndarray
+    joints: np.ndarray
     lanes: np.ndarray
     pointers: np.ndarray
     counts: np.ndarray
@@ -157,36 +159,37 @@ class _Run:
         self.inputs = inputs
         self.layout = Layout(batch.model.plant, batch.size, inputs)
         self.coefficients = coefficients(batch, simulator.smoothing)
-        self.coefficients.present[R.ON_ENGINE] = True
+        self.coefficients.on[R.ON_ENGINE] = True
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
-        self.past = self.layout.past(self.coefficients.present)
+        self.past = self.layout.past(self.coefficients.on)
 
     def advance(
         self,
         initial: np.ndarray,
         commands: np.ndarray,
         *,
-        ramps: np.ndarray = HELD,
-        loop: ClosedLoop = OPEN,
+        ramps: np.ndarray | None = None,
+        loop: ClosedLoop | None = None,
         controller: Callable[[float, np.ndarray], np.ndarray] | None = None,
         path: Path | None = None,
     ) -> np.ndarray:
-        """What the sensors show of every lane, shape (K + 1, 4, lanes).
+        """What the sensors show of every lane, shape (K + 1, 2 N, lanes).
 
         Args:
             initial: Shape (2 joints, P, R).
-            commands: Shape (K, 2, R), or (K, 2, lanes) where a `loop` or a `controller` writes them.
-            ramps: Change of the commands along each row, shape (K, 2, R).
-            loop: Compiled feedback.
+            commands: Shape (K, N, R), or (K, N, lanes) where a `loop` or a `controller` writes them.
+            ramps: Change of the commands along each row, shape (K, N, R); None for none.
+            loop: Compiled feedback; None for none.
             controller: Of a single lane.
             path: Where the rollouts are led at first.
         """
         led = self.layout.led(path)
         states = self.layout.states(initial)
-        self.coefficients.present[R.ON_RAMP] = ramps is not HELD
-        out = np.empty((self.layout.rows + 1, 4, self.layout.lanes))
-        own = loop is not OPEN or controller is not None
+        self.coefficients.on[R.ON_RAMP] = ramps is not None
+        ramps = self.layout.held() if ramps is None else ramps
+        out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))
+        own = loop is not None or controller is not None
         world = self.simulator.open()
         try:
             for p, model in enumerate(self.models):
@@ -203,37 +206,42 @@ class _Run:
         count = min(W, self.inputs.windows - window)
         windows = window + np.minimum(np.arange(W), count - 1)
         lanes = p * self.inputs.windows + windows
-        rows = np.zeros((R.N_ROWS, W))
-        rows[: R.N_COEFFICIENTS] = self.coefficients.rows[:, p, None]
-        rows[R.N_COEFFICIENTS : R.N_STATES] = states[:, lanes]
+        body = np.repeat(self.coefficients.body[:, p], W)
+        joints = np.repeat(self.coefficients.joints[:, :, p, None], W, axis=2)
+        joints[:, : R.STATES] = states[:, :, lanes]
         return _Block(
-            Exchange(self.layout.joints),
-            rows,
+            Exchange.of(self.layout.joints, self.layout.width),
+            body,
+            joints.reshape(self.layout.width, -1),
             np.stack([windows, lanes if own else windows]).astype(np.int64),
-            np.zeros(W, dtype=np.int64),
+            np.zeros((self.layout.width, W), dtype=np.int64),
             np.zeros(W, dtype=np.int64),
             int(lanes[0]),
             count,
         )
 
     def _advance(
-        self, block: _Block, world: World, commands, ramps, loop: ClosedLoop, controller, out, led, until
+        self, block: _Block, world: World, commands, ramps, loop: ClosedLoop | None, controller, out, led, until
     ) -> None:
         """Simulate every row of a block."""
-        on, t = self.coefficients.present, self.inputs.t
-        S, X = block.rows.reshape(-1), block.exchange.values
+        on, has, parts, t = self.coefficients.on, self.coefficients.has, self.coefficients.parts, self.inputs.t
+        S, B, X = block.body, block.joints, block.exchange.lanes
         lanes, pointers, counts = block.lanes, block.pointers, block.counts
-        actuated, first, count = self.coefficients.actuated, block.first, block.count
+        first, count = block.first, block.count
+        closed = loop is not None
+        loop = loop or self.layout.open_loop()
         n = filled(count)
         pattern, driven = self.layout.pattern, self.layout.driven
         for k in range(self.layout.rows):
-            show(S, n, on, self.past, t, lanes, k, out, first, count, led, until)
+            show(B, n, on, self.past, t, lanes, k, out, first, count, led, until)
             if controller is not None:
                 commands[k, driven, 0] = controller(float(t[k, 0]), out[k, pattern, 0])
             least, most = begin(
                 S,
+                B,
                 n,
                 on,
+                has,
                 t,
                 commands,
                 ramps,
@@ -241,20 +249,19 @@ class _Run:
                 self.substeps,
                 lanes,
                 counts,
-                actuated,
                 k,
                 first,
                 count,
-                loop is not OPEN,
+                closed,
                 loop.gains,
                 loop.references,
                 loop.noise,
                 loop.settings,
             )
             for s in range(most):
-                before(S, n, X, on, t, commands, ramps, lanes, pointers, actuated, counts, least, s)
+                before(S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, parts)
                 world.weigh()
-                between(S, n, X, on)
+                between(S, B, n, X, on, has, parts)
                 world.advance()
-                after(S, n, X)
-        show(S, n, on, self.past, t, lanes, self.layout.rows, out, first, count, led, until)
+                after(S, B, n, X)
+        show(B, n, on, self.past, t, lanes, self.layout.rows, out, first, count, led, until)

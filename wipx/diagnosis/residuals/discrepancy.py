@@ -13,8 +13,8 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests
-from wipx.effects.remainder import COMMANDS, KNOTS, TIME
-from wipx.sim.coefficients import joint_index
+from wipx.effects.remainder import KNOTS
+from wipx.sim.coefficients import joint_count, joint_index
 
 ROUNDS = 3  # of linearising anew
 NUGGET = 1e-8
@@ -107,11 +107,13 @@ def curve_of(shape: Shape, fit: Fit, spread: np.ndarray, data: RecordingBatch) -
 
 
 def _code(shape: Shape, data: RecordingBatch) -> int:
+    """Number of a signal in the law of the effect `remainder`."""
     plant = data.plant
+    joints = joint_count(plant)
     if shape.signal in plant.coordinates:
-        return joint_index(plant.joints[plant.coordinates.index(shape.signal)])
+        return joint_index(plant, plant.joints[plant.coordinates.index(shape.signal)])
     if shape.signal in plant.rates:
-        return 2 + joint_index(plant.joints[plant.rates.index(shape.signal)])
+        return joints + joint_index(plant, plant.joints[plant.rates.index(shape.signal)])
     if shape.signal in plant.commands:
-        return COMMANDS[joint_index(plant.actuated[plant.commands.index(shape.signal)])]
-    return TIME
+        return 2 * joints + joint_index(plant, plant.actuated[plant.commands.index(shape.signal)])
+    return 3 * joints
