@@ -67,7 +67,8 @@ def _is_compiled(node: ast.stmt) -> bool:
 
 
 @cache
-def _cache_folder() -> Path:
+def compiled_folder() -> Path:
+    """Folder of compiled code, named after its sources; NUMBA_CACHE_DIR moves what numba keeps, not what is written here."""
     digest = sources_digest(PACKAGE)
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = home / "wipx" / digest
@@ -81,7 +82,7 @@ def _cache_folder() -> Path:
 def _keep_on_disk() -> None:
     if "NUMBA_CACHE_DIR" not in os.environ:
         settings: Any = numba_settings  # its names are made at run time
-        settings.CACHE_DIR = str(_cache_folder())
+        settings.CACHE_DIR = str(compiled_folder())
 
 
 def cached(function):

@@ -1,24 +1,27 @@
 """From models to the coefficients of the equations of motion, for a whole batch at once.
 
-This is where geometry acts (payload, inertia, reflected rotor inertia) and where effects of
-one kind add up: everything that is constant during a rollout. What happens in a step is in
-`wipx.sim.kernel`.
+Each effect says itself which rows it fills (`wipx.core.effect.Effect.rows`); here they are put together, and geometry
+acts (payload, inertia, reflected rotor inertia): everything that is constant during a rollout. What happens in a step
+is in `wipx.sim.kernel`.
 """
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 
+from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
-from wipx.effects.catalogue import kinds
-from wipx.effects.lagged_stribeck import lag_of
+from wipx.effects.catalogue import kind_of, kinds
 from wipx.effects.payload import loaded
-from wipx.effects.remainder import KNOTS
 from wipx.sim import body as B
 from wipx.sim import rows as R
 
-FASTEST_LAG = 1e-30  # [s]; a lag of zero is one that settles at once
+Columns = Mapping[str, np.ndarray]
+ON = "ON_"  # names of flags begin so
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Coefficients:
     joints: np.ndarray
     on: np.ndarray
     has: np.ndarray
-    parts: tuple[object, object, object]
+    parts: tuple[Any, Any, Any]
 
 
 class _Filler:
@@ -47,36 +50,56 @@ class _Filler:
         self.batch = batch
         self.effects = batch.model.effects
         self.plant = batch.model.plant
-        self.rows = np.zeros((B.ROWS, batch.size))
-        self.blocks = np.zeros((B.JOINTS, R.BLOCK, batch.size))
+        self.body = np.zeros((B.ROWS, batch.size))
+        self.joints = np.repeat(_neutral_block(tuple(kinds()))[None, :, None], joint_count(self.plant), axis=0)
+        self.joints = np.repeat(self.joints, batch.size, axis=2)
         self.on = np.zeros(R.FLAGS, dtype=np.bool_)
-        self.has = np.zeros((B.JOINTS, R.JOINT_FLAGS), dtype=np.bool_)
-
-    def plant_value(self, name: str) -> np.ndarray:
-        return self.batch.column(name)
+        self.has = np.zeros((len(self.joints), R.JOINT_FLAGS), dtype=np.bool_)
 
     def values(self, name: str) -> dict[str, np.ndarray] | None:
         """Parameters of an effect as arrays (P,), or None where it is absent; those not given have their defaults."""
         if name not in self.effects:
             return None
-        parameters = kinds()[name.partition("/")[2]].parameters
-        found = {p.name: np.full(self.batch.size, p.default) for p in parameters if p.default is not None}
+        found = {p.name: np.full(self.batch.size, p.default) for p in kind_of(name).parameters if p.default is not None}
         return found | {symbol: self.batch.column(f"{name}.{symbol}") for symbol in self.effects[name]}
 
-    def add(self, name: str, j: int, **targets: int) -> bool:
-        """Add the parameters of an effect to rows of joint j; whether there is such an effect."""
-        values = self.values(name)
-        for symbol, row in targets.items() if values is not None else ():
-            self.blocks[j, row] += values[symbol]
-        return values is not None
+    def add_effects(self) -> None:
+        """Fill the rows of all effects, and raise their flags."""
+        body = {name: self.batch.column(name) for name in self.plant.parameters}
+        filled: set[tuple[int, int]] = set()
+        for name in self.effects:
+            site, effect, values = name.partition("/")[0], kind_of(name), self.values(name)
+            if site not in self.plant.sites or values is None:
+                continue
+            for row, value in _rows(effect, values, body):
+                for j in joints_of(row, site, self.plant):
+                    rows = self.body if j < 0 else self.joints[j]
+                    for i, each in enumerate(np.atleast_2d(value), row_at(row, site)):
+                        rows[i] = rows[i] + each if (j, i) in filled else each
+                        filled.add((j, i))
+            for part in effect.parts(values) if callable(effect.parts) else effect.parts:
+                for j in joints_of(f"{ON}{part}", site, self.plant):
+                    flags = self.on if j < 0 else self.has[j]
+                    flags[row_at(f"{ON}{part}", site)] = True
 
-    def set(self, name: str, j: int, flag: int, **targets: int) -> bool:
-        """Set rows of joint j to the parameters of an effect and raise its flag; whether there is such an effect."""
-        values = self.values(name)
-        for symbol, row in targets.items() if values is not None else ():
-            self.blocks[j, row] = values[symbol]
-        self.has[j, flag] |= values is not None
-        return values is not None
+
+def _rows(effect: Effect, values: Columns, body: Columns) -> Iterator[tuple[str, np.ndarray]]:
+    """Names of the rows that an effect fills, each with its value, shape (P,) or (n, P)."""
+    for row, coefficient in effect.rows.items():
+        yield row, values[coefficient] if isinstance(coefficient, str) else coefficient(values, body)
+
+
+@cache
+def _neutral_block(known: tuple[str, ...]) -> np.ndarray:
+    """Rows of a joint without any effect, shape (BLOCK,): an absent effect equals one at its neutral values."""
+    rows = np.zeros(R.BLOCK)
+    for effect in (kinds()[kind] for kind in known):
+        neutral = {symbol: np.array([value]) for symbol, value in effect.neutral.items()}
+        for row, value in _rows(effect, neutral, {}):
+            for name in (row, f"SENSOR_{row}"):
+                if hasattr(R, name):
+                    rows[getattr(R, name)] = np.ravel(value)[0]
+    return rows
 
 
 def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coefficients:
@@ -88,27 +111,23 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     """
     f = _Filler(batch)
     plant = f.plant
-    for block in f.blocks:
-        _set_neutral(block)
-    f.rows[[B.MASS, B.INERTIA]] = 1.0
+    f.body[[B.MASS, B.INERTIA]] = 1.0  # of a joint that the plant lacks
+    f.add_effects()
     if plant.kind == "double_pendulum":
-        body = B.double_body
         _double_pendulum(f)
     else:
-        body = B.wip_body
         _wip_family(f)
-    for site in plant.joints:
-        j = joint_index(plant, site)
-        _joint(f, site, j)
-        _sensor(f, f"sensor_{plant.columns[site]}", j)
     for site in plant.actuated:
-        _actuator(f, "actuator", joint_index(plant, site))
-    f.has[0, R.ON_SPRING] = f.add("environment/spring", 0, k=R.SPRING, x0=R.SPRING_REST)
+        f.joints[joint_index(plant, site), R.INPUT_GAIN] = batch.column("input_gain")
+        f.has[joint_index(plant, site), R.ACTUATED] = True
     for site, speed in zip(plant.joints, smoothing, strict=False):
-        f.blocks[joint_index(plant, site), R.SMOOTHING] = speed
+        f.joints[joint_index(plant, site), R.SMOOTHING] = speed
         f.on[R.ON_SMOOTHING] = True
+    f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
+    f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
     f.on[R.ON_TIME] = f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
-    return Coefficients(f.rows, f.blocks, f.on, f.has, (body, body, body))
+    body = B.double_body if plant.kind == "double_pendulum" else B.wip_body
+    return Coefficients(f.body, f.joints, f.on, f.has, (body, body, body))
 
 
 def joint_count(plant: Plant) -> int:
@@ -121,43 +140,45 @@ def joint_index(plant: Plant, site: str) -> int:
     return {"translation": 0, "joint1": 0, "pitch": 1, "joint2": 1}[site]
 
 
-def _set_neutral(block: np.ndarray) -> None:
-    block[R.GAIN] = 1.0
-    block[[R.FORCE_MAX, R.STALL, R.FREE_SPEED]] = 1e9
-    block[[R.LAG_RATE, R.PAPER_RATE]] = 1.0 / FASTEST_LAG
-    block[[R.DRIVE_INERTIA, R.STRIBECK_SPEED, R.PEAK_SPEED, R.PAPER_SPEED]] = 1.0
+def row_at(name: str, site: str) -> int:
+    """Number of the row, or of the flag, that an effect at a site means by a name; `X` is `SENSOR_X` at a sensor.
+
+    Raises:
+        AttributeError: there is no such row.
+    """
+    if site.startswith("sensor_"):
+        sensor = f"{ON}SENSOR_{name.removeprefix(ON)}" if name.startswith(ON) else f"SENSOR_{name}"
+        name = sensor if hasattr(R, sensor) else name
+    return getattr(B if hasattr(B, name) else R, name)
+
+
+def joints_of(name: str, site: str, plant: Plant) -> list[int]:
+    """Joints whose blocks have the row or flag of that name for an effect at a site; -1 for the whole robot."""
+    if hasattr(B, name) or (name.startswith(ON) and row_at(name, site) < R.FLAGS):
+        return [-1]
+    return [joint_index(plant, joint) for joint in plant.joints_at(site)]
 
 
 def _wip_family(f: _Filler) -> None:
     """Contract section 2: wip, and cartpole, pendulum and linear_axis as its special cases."""
     plain = _rigid_body(f, with_event=False)
     for row, value in zip((B.MASS, B.COUPLING, B.INERTIA, B.GRAVITY), plain[:4], strict=True):
-        f.rows[row] = value
-    event = f.values("geometry/payload_event")
-    if event is not None:
-        f.on[R.ON_EVENT] = True
+        f.body[row] = value
+    if "geometry/payload_event" in f.effects:
         loaded_body = _rigid_body(f, with_event=True)
         deltas = (B.EVENT_MASS, B.EVENT_COUPLING, B.EVENT_INERTIA, B.EVENT_GRAVITY, B.EVENT_WEIGHT)
         for row, after, before in zip(deltas, loaded_body, plain, strict=True):
-            f.rows[row] = after - before
-        f.rows[B.EVENT_TIME] = event["t0"]
-    balance = f.values("geometry/com_offset")
-    if balance is not None:
-        f.rows[B.BALANCE] = balance["theta_eq"]
-    tilt = f.values("environment/rail_tilt")
-    if tilt is not None:
-        f.on[R.ON_TILT] = True
-        f.rows[B.TILT] = tilt["angle"]
-        f.rows[B.TILT_FORCE] = plain[4]
+            f.body[row] = after - before
+    f.body[B.TILT_FORCE] = plain[4]
 
 
 def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
     """Mass m11, coupling m_b L, inertia m22, gravity m_b g L, and weight along a tilted rail, each (P,)."""
     has = f.plant.parameters
     zero = np.zeros(f.batch.size)
-    body = f.plant_value("body_mass")
-    com = f.plant_value("com_height") if "com_height" in has else zero
-    inertia = f.plant_value("body_inertia") if "body_inertia" in has else zero
+    body = f.batch.column("body_mass")
+    com = f.batch.column("com_height") if "com_height" in has else zero
+    inertia = f.batch.column("body_inertia") if "body_inertia" in has else zero
     scale = f.values("geometry/inertia")
     if scale is not None:
         inertia = inertia * scale["scale"]
@@ -166,12 +187,12 @@ def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
         extra = f.values(name)
         if extra is not None:
             body, com, inertia = loaded(body, com, inertia, extra["mass"], extra["height"])
-    gravity = f.plant_value("gravity")
+    gravity = f.batch.column("gravity")
     rotor = [f.values(f"{site}/rotor_inertia") for site in ("translation", "pitch")]
     one = np.ones(f.batch.size)
     if "translation" in f.plant.joints:
-        carriage = f.plant_value("wheel_mass")
-        rolling = f.plant_value("wheel_inertia") / f.plant_value("wheel_radius") ** 2
+        carriage = f.batch.column("wheel_mass")
+        rolling = f.batch.column("wheel_inertia") / f.batch.column("wheel_radius") ** 2
         mass = body + carriage + rolling + (rotor[0]["J"] if rotor[0] else 0.0)
     else:
         carriage, mass = zero, one
@@ -186,100 +207,12 @@ def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
 
 def _double_pendulum(f: _Filler) -> None:
     """Double pendulum, theta1 = 0 hanging, theta2 relative to link 1; inertias about the joints."""
-    mass1, mass2 = f.plant_value("link1_mass"), f.plant_value("link2_mass")
-    length1, com1, com2 = f.plant_value("link1_length"), f.plant_value("link1_com"), f.plant_value("link2_com")
-    gravity = f.plant_value("gravity")
-    f.rows[B.DP_ELBOW] = f.plant_value("link2_inertia")
-    f.rows[B.DP_BASE] = f.plant_value("link1_inertia") + mass2 * length1**2 + f.rows[B.DP_ELBOW]
-    f.rows[B.DP_COUPLING] = mass2 * length1 * com2
-    f.rows[B.DP_GRAVITY] = mass2 * com2 * gravity
-    f.rows[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
-    f.add("joint1/rotor_inertia", 0, J=R.ROTOR)
-    f.add("joint2/rotor_inertia", 1, J=R.ROTOR)
-
-
-def _actuator(f: _Filler, site: str, j: int) -> None:
-    block = f.blocks[j]
-    f.has[j, R.ACTUATED] = True
-    block[R.INPUT_GAIN] = f.plant_value("input_gain")
-    f.on[R.ON_DELAY] |= f.add(f"{site}/delay", j, tau=R.DELAY)
-    f.set(f"{site}/offset", j, R.ON_OFFSET, F_0=R.OFFSET)
-    f.set(f"{site}/dead_zone", j, R.ON_DEAD_ZONE, band=R.DEAD_BAND)
-    f.set(f"{site}/gain", j, R.ON_GAIN, k=R.GAIN)
-    f.set(f"{site}/saturation", j, R.ON_SATURATION, F_max=R.FORCE_MAX)
-    f.set(f"{site}/speed_limit", j, R.ON_SPEED_LIMIT, F_stall=R.STALL, v_free=R.FREE_SPEED)
-    f.set(f"{site}/back_emf", j, R.ON_BACK_EMF, k_e=R.BACK_EMF)
-    if f.set(f"{site}/lag", j, R.ON_LAG, tau=R.LAG_RATE):
-        block[R.LAG_RATE] = 1.0 / np.maximum(block[R.LAG_RATE], FASTEST_LAG)
-    if f.set(f"{site}/ripple", j, R.ON_RIPPLE, A=R.RIPPLE, phase=R.RIPPLE_PHASE, n=R.RIPPLE_PERIODS):
-        block[R.RIPPLE_PERIODS] /= f.plant_value("wheel_radius") if "wheel_radius" in f.plant.parameters else 1.0
-    gap = {"gap": R.GAP, "drive_inertia": R.DRIVE_INERTIA, "drive_damping": R.DRIVE_DAMPING, "returned": R.RETURNED}
-    if f.set(f"{site}/backlash", j, R.ON_BACKLASH, **gap, contact_time=R.CONTACT_RATE):
-        block[R.CONTACT_RATE] = 1.0 / np.maximum(block[R.CONTACT_RATE], FASTEST_LAG)
-    f.has[j, R.ON_MEMORY] |= f.has[j, R.ON_LAG] or f.has[j, R.ON_BACKLASH]
-
-
-def _joint(f: _Filler, site: str, j: int) -> None:
-    block, has = f.blocks[j], f.has[j]
-    damped = f.add(f"{site}/viscous", j, sigma=R.VISCOUS)
-    has[R.ON_DRAG] = f.add(f"{site}/quadratic_drag", j, c=R.DRAG)
-    dry = False
-    for name, plus, minus in (
-        ("coulomb", "F_c", "F_c"),
-        ("asymmetric_coulomb", "F_plus", "F_minus"),
-        ("stribeck", "F_c", "F_c"),
-    ):
-        dry |= f.add(f"{site}/{name}", j, **{plus: R.LEVEL_PLUS})
-        dry |= f.add(f"{site}/{name}", j, **{minus: R.LEVEL_MINUS})
-    f.set(f"{site}/stribeck", j, R.ON_STRIBECK, F_s=R.STATIC, F_c=R.COULOMB, v_s=R.STRIBECK_SPEED)
-    dry |= f.set(f"{site}/sticky_spot", j, R.ON_SPOT, F_c=R.SPOT, lo=R.SPOT_LOW, hi=R.SPOT_HIGH)
-    dry |= f.set(f"{site}/load_friction", j, R.ON_LOAD, K_motor=R.LOAD_MOTOR, K_external=R.LOAD_EXTERNAL)
-    bristle = {"F_c": R.SLIDING, "stiffness": R.BRISTLE, "damping": R.BRISTLE_DAMPING}
-    f.set(f"{site}/presliding", j, R.ON_BRISTLE, **bristle)
-    f.set(f"{site}/lugre", j, R.ON_BRISTLE, **bristle, F_s=R.PEAK, v_s=R.PEAK_SPEED)
-    f.set(f"{site}/hysteresis", j, R.ON_HYSTERESIS, **bristle, n=R.EXPONENT, gamma=R.GAMMA)
-    has[R.ON_BRISTLE] |= has[R.ON_HYSTERESIS]
-    if has[R.ON_BRISTLE]:
-        damped = True
-        # A bristle without a level slides at once; from rest it would first be a spring.
-        held = np.maximum(block[R.SLIDING], block[R.PEAK]) > 0.0
-        block[[R.BRISTLE, R.BRISTLE_DAMPING]] *= held
-    values = f.values(f"{site}/remainder")
-    if values is not None:
-        dry |= bool(np.any(values["factor"] < 0.0))
-        _remainder(f, values, j)
-    if f.set(f"{site}/resonance", j, R.ON_SWING, m=R.SWING, f=R.SWING_STIFFNESS, zeta=R.SWING_DAMPING):
-        pulsation = 2.0 * np.pi * block[R.SWING_STIFFNESS]
-        block[R.SWING_STIFFNESS] = pulsation**2
-        block[R.SWING_DAMPING] *= 2.0 * pulsation
-    paper = {
-        "F_s": R.PAPER_STATIC,
-        "F_c": R.PAPER_COULOMB,
-        "v_s": R.PAPER_SPEED,
-        "sigma": R.PAPER_VISCOUS,
-        "epsilon": R.PAPER_EPSILON,
-        "alpha": R.PAPER_RATE,
-    }
-    if f.set(f"{site}/lagged_stribeck", j, R.ON_PAPER, **paper):
-        block[R.PAPER_RATE] = 1.0 / np.maximum(lag_of(block[R.PAPER_RATE]), FASTEST_LAG)
-    laws = [R.ON_DRAG, R.ON_STRIBECK, R.ON_SPOT, R.ON_LOAD, R.ON_BRISTLE, R.ON_PAPER, R.ON_REMAINDER, R.ON_SWING]
-    has[R.ON_LAWS] = has[laws].any()
-    has[R.ON_MEMORY] |= has[R.ON_PAPER]
-    f.on[R.ON_DAMPING] |= damped
-    f.on[R.ON_FRICTION] |= dry
-
-
-def _remainder(f: _Filler, values: dict[str, np.ndarray], j: int) -> None:
-    block = f.blocks[j]
-    f.has[j, R.ON_REMAINDER] = True
-    for symbol, row in (("signal", R.REMAINDER_SIGNAL), ("factor", R.REMAINDER_FACTOR), ("low", R.REMAINDER_LOW)):
-        block[row] = values[symbol]
-    block[R.REMAINDER_PER_UNIT] = (KNOTS - 1) / np.maximum(values["high"] - values["low"], 1e-12)
-    for i in range(KNOTS):
-        block[R.REMAINDER + i] = values[f"f{i}"]
-
-
-def _sensor(f: _Filler, site: str, j: int) -> None:
-    f.add(f"{site}/bias", j, b=R.BIAS)
-    f.add(f"{site}/scale", j, e=R.SCALE)
-    f.on[R.ON_SENSOR_DELAY] |= f.add(f"{site}/delay", j, tau=R.SENSOR_DELAY)
+    column = f.batch.column
+    mass1, mass2 = column("link1_mass"), column("link2_mass")
+    length1, com1, com2 = column("link1_length"), column("link1_com"), column("link2_com")
+    gravity = column("gravity")
+    f.body[B.DP_ELBOW] = column("link2_inertia")
+    f.body[B.DP_BASE] = column("link1_inertia") + mass2 * length1**2 + f.body[B.DP_ELBOW]
+    f.body[B.DP_COUPLING] = mass2 * length1 * com2
+    f.body[B.DP_GRAVITY] = mass2 * com2 * gravity
+    f.body[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity

@@ -36,7 +36,8 @@ def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) 
     """
     known = coefficients(batch)
     on, has = known.on.copy(), known.has.copy()
-    on[list(RIGID)] = has[:, R.ACTUATED] = False
+    on[list(RIGID)] = False
+    has[:, [R.ACTUATED, R.ON_GAIN]] = False
     if on.any() or has.any() or inputs.ramps is not None or not np.isfinite(initial).all():
         return False
     return _Steps.of(inputs, step).even

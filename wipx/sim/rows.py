@@ -93,4 +93,6 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_HYSTERESIS, ON_PAPER, ON_REMAINDER, ON_SWING,
     JOINT_FLAGS,
     *_,
-) = range(100)  # fmt: skip
+) = range(FLAGS, 100)  # fmt: skip
+LAWS = (ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_PAPER, ON_REMAINDER, ON_SWING)
+MEMORY = (ON_LAG, ON_BACKLASH, ON_PAPER)

@@ -1,0 +1,218 @@
+"""MJCF and URDF files as trees; MuJoCo reads both."""
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wipx.core.errors import InputError
+from wipx.core.tree import Link, Tree
+
+
+def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
+    """The tree of links in a model file.
+
+    Meshes and textures need not be there; contacts, actuators and sensors of the file are not part of the tree.
+
+    Args:
+        path: MJCF or URDF.
+        locked: Joints that are fixed, with their positions [rad or m]; their links join those below.
+
+    Raises:
+        InputError: the file is missing or no such file, MuJoCo is not installed, or the robot is no open tree of hinges
+            and slides on a fixed base.
+    """
+    mujoco = _mujoco(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of an MJCF or URDF file relative to robot.yaml")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path}: {_first_line(error)}; expected an MJCF or URDF file") from error
+    _strip(mujoco, spec, path)
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        raise InputError(f"{path}: {_first_line(error)}; correct the file") from error
+    _refuse(mujoco, model, path)
+    return _tree(mujoco, model, dict(locked or {}), path)
+
+
+def _mujoco(path: Path) -> Any:
+    try:
+        return importlib.import_module("mujoco")
+    except ModuleNotFoundError as error:
+        raise InputError(f'{path} is read by MuJoCo, which is not installed; pip install "mujoco>=4.0,<5"') from error
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".;") if str(error).strip() else type(error).__name__
+
+
+def _strip(mujoco: Any, spec: Any, path: Path) -> None:
+    """Leave only what moves: joints and inertias."""
+    for joint in spec.joints:
+        if joint.type in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+            kind = "free" if joint.type == mujoco.mjtJoint.mjJNT_FREE else "ball"
+            raise InputError(
+                f"{path}: joint {joint.name or 'without a name'} is a {kind} joint, expected hinges and slides on a "
+                f"fixed base; a base that moves in the plane is a slide and a hinge"
+            )
+    if spec.equalities:
+        first = spec.equalities[0]
+        names = " and ".join(name for name in (first.name1, first.name2) if name)
+        raise InputError(
+            f"{path}: {names or first.name or 'two bodies'} are coupled (a closed loop, a coupling of joints or a "
+            f"mimic joint), expected an open tree; remove the coupling or lock one of the joints in robot.yaml"
+        )
+    if spec.tendons:
+        raise InputError(f"{path}: tendon {spec.tendons[0].name or 1} is not supported; remove it from the file")
+    for many in (spec.actuators, spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras):
+        for each in list(many):
+            spec.delete(each)
+    for body in spec.bodies[1:]:
+        for geom in list(body.geoms):
+            if body.explicitinertial or geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+                spec.delete(geom)
+    for many in (spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures):
+        for each in list(many):
+            spec.delete(each)
+
+
+def _refuse(mujoco: Any, model: Any, path: Path) -> None:
+    """Refuse what no tree of rigid links is."""
+    if model.njnt == 0:
+        raise InputError(f"{path}: the model has no joint that moves")
+    for j in range(model.njnt):
+        name = model.joint(j).name
+        if not name:
+            raise InputError(f"{path}: a joint of body {model.body(model.jnt_bodyid[j]).name} has no name; give it one")
+        if np.any(model.jnt_stiffness[j] != 0.0):
+            raise InputError(f"{path}: joint {name} has a spring; remove it and add the effect {name}/spring instead")
+    if np.any(model.body_gravcomp != 0.0):
+        body = model.body(int(np.argmax(model.body_gravcomp != 0.0))).name
+        raise InputError(f"{path}: body {body} has gravity compensation, which is not supported; remove it")
+
+
+def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree:
+    data = mujoco.MjData(model)
+    joints = [model.joint(j).name for j in range(model.njnt)]
+    for name, position in locked.items():
+        if name not in joints:
+            raise InputError(f"{path}: there is no joint {name} to lock; there are {', '.join(joints)}")
+        data.qpos[model.jnt_qposadr[joints.index(name)]] = position
+    for j, name in enumerate(joints):
+        if name not in locked:
+            data.qpos[model.jnt_qposadr[j]] = 0.0
+    mujoco.mj_kinematics(model, data)
+    free = [j for j in range(model.njnt) if joints[j] not in locked]
+    if not free:
+        raise InputError(f"{path}: every joint is locked; leave at least one that moves")
+    number = {j: i for i, j in enumerate(free)}
+    carrier = _carriers(model, number)
+    frames = {i: _frame(model, data, j, free) for j, i in number.items()}
+    links = []
+    for j, i in number.items():
+        parent = _parent(model, j, number, carrier)
+        turn, origin = frames[i]
+        below_turn, below = frames[parent] if parent >= 0 else (np.eye(3), np.zeros(3))
+        body = int(model.jnt_bodyid[j])
+        mass, com, inertia = _lumped(model, data, i, carrier, turn, origin)
+        own = data.xmat[body].reshape(3, 3)
+        limited = bool(model.jnt_limited[j])
+        effort = float(np.max(np.abs(model.jnt_actfrcrange[j]))) if model.jnt_actfrclimited[j] else None
+        dof = int(model.jnt_dofadr[j])
+        links.append(
+            Link(
+                joint=joints[j],
+                body=model.body(body).name or f"body{body}",
+                parent=parent,
+                slides=model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE,
+                rotation=below_turn.T @ turn,
+                place=below_turn.T @ (origin - below),
+                mass=mass,
+                com=com,
+                inertia=inertia,
+                body_rotation=turn.T @ own,
+                body_place=turn.T @ (data.xpos[body] - origin),
+                armature=float(model.dof_armature[dof]),
+                damping=float(np.ravel(model.dof_damping[dof])[0]),
+                friction=float(model.dof_frictionloss[dof]),
+                limits=(float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1])) if limited else None,
+                effort=effort,
+            )
+        )
+    tree = Tree(tuple(links), np.array(model.opt.gravity, dtype=float))
+    _check_masses(tree, path)
+    return tree
+
+
+def _carriers(model: Any, number: dict[int, int]) -> dict[int, int]:
+    """The link that carries each body: that of its last joint which moves, else that of the body below; -1 the ground."""
+    carrier = {0: -1}
+    for body in range(1, model.nbody):
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        own = [number[j] for j in range(first, first + count) if j in number] if count else []
+        carrier[body] = own[-1] if own else carrier[int(model.body_parentid[body])]
+    return carrier
+
+
+def _parent(model: Any, j: int, number: dict[int, int], carrier: dict[int, int]) -> int:
+    """The link below joint j: that of the joint before it on the same body, else the carrier of the body below."""
+    body = int(model.jnt_bodyid[j])
+    before = [number[k] for k in range(int(model.body_jntadr[body]), j) if k in number]
+    return before[-1] if before else carrier[int(model.body_parentid[body])]
+
+
+def _frame(model: Any, data: Any, j: int, free: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and origin of a link in the world: z along the joint, x across to the next joint, which makes zeros."""
+    z, anchor = np.array(data.xaxis[j]), np.array(data.xanchor[j])
+    body = int(model.jnt_bodyid[j])
+    following = next((k for k in free if k > j and int(model.body_parentid[model.jnt_bodyid[k]]) == body), None)
+    across = np.zeros(3)
+    if following is not None:
+        other, there = np.array(data.xaxis[following]), np.array(data.xanchor[following])
+        across = np.cross(z, other)
+        apart = there - anchor
+        if np.linalg.norm(across) < 1e-9:  # parallel axes: across the gap between them
+            across = apart - z * (z @ apart)
+        elif abs(z @ other) < 1.0:
+            # foot of the common normal on this axis
+            along = (apart @ z - (apart @ other) * (z @ other)) / (1.0 - (z @ other) ** 2)
+            anchor = anchor + along * z
+    if np.linalg.norm(across) < 1e-9:
+        across = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x = across / np.linalg.norm(across)
+    return np.stack([x, np.cross(z, x), z], axis=1), anchor
+
+
+def _lumped(
+    model: Any, data: Any, link: int, carrier: dict[int, int], turn: np.ndarray, origin: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre and inertia about it of all bodies that a link carries, in the link's frame."""
+    bodies = [body for body, carried_by in carrier.items() if body > 0 and carried_by == link]
+    masses = np.array([model.body_mass[body] for body in bodies])
+    total = float(masses.sum())
+    if not total:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    places = np.array([turn.T @ (data.xipos[body] - origin) for body in bodies])
+    com = masses @ places / total
+    inertia = np.zeros((3, 3))
+    for body, place in zip(bodies, places, strict=True):
+        axes = turn.T @ data.ximat[body].reshape(3, 3)
+        away = place - com
+        shift = model.body_mass[body] * (away @ away * np.eye(3) - np.outer(away, away))
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T + shift
+    return total, com, inertia
+
+
+def _check_masses(tree: Tree, path: Path) -> None:
+    """Every joint must move some inertia: its own or that of links above it."""
+    carried = [link.mass + link.armature for link in tree.links]
+    for i in reversed(range(len(tree.links))):
+        if tree.links[i].parent >= 0:
+            carried[tree.links[i].parent] += carried[i]
+    for link, inertia in zip(tree.links, carried, strict=True):
+        if not inertia > 0.0:
+            raise InputError(f"{path}: body {link.body} that joint {link.joint} moves has no mass; give it an inertial")

@@ -1,0 +1,1 @@
+"""The rigid body of any open tree, as code that is written out for each robot."""
