@@ -202,7 +202,7 @@ class _Run:
                 self.coefficients.joints,
                 self.coefficients.on,
                 self.coefficients.has,
-                self.coefficients.parts,
+                self.coefficients.rigid,
                 states,
                 self.inputs.t,
                 commands,

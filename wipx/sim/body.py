@@ -64,7 +64,7 @@ def tilted(S, B, n, on):
 
 
 @part
-def wip_body(S, B, n, on):
+def wip_body(S, B, n, on, asked):
     """Wip, cart-pole, pendulum, linear axis."""
     P, D = B[0], B[1]
     for w in range(n):
@@ -84,7 +84,7 @@ def wip_body(S, B, n, on):
 
 
 @part
-def double_body(S, B, n, on):
+def double_body(S, B, n, on, asked):
     """Double pendulum, theta1 = 0 hanging."""
     P, D = B[0], B[1]
     for w in range(n):

@@ -9,7 +9,6 @@ import ast
 import hashlib
 import os
 import tempfile
-import warnings
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -17,11 +16,9 @@ from typing import Any
 
 import numba
 from numba.core import config as numba_settings
-from numba.core.errors import NumbaExperimentalFeatureWarning
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
-warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)  # of functions that are given at run time
 FLAGS: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}, "error_model": "numpy"}
 COMPILED = ("cached", "law", "inlined", "part")  # decorators
 
@@ -92,7 +89,13 @@ def cached(function):
 
 
 def part(function):
-    """Compile a part that the kernel is given at run time: a function of rows, blocks, lanes in use and flags."""
+    """Compile a rigid body, which the kernel is given at run time.
+
+    It is a function of the rows of the robot and of its joints, the lanes in use, the flags, and what is asked for
+    (`wipx.sim.rows.FORCES` and so on).
+    """
     _keep_on_disk()
     rows, blocks, flags = numba.types.float64[::1], numba.types.float64[:, ::1], numba.types.boolean[::1]
-    return numba.cfunc(numba.types.void(rows, blocks, numba.types.int64, flags), cache=True, **FLAGS)(function)
+    return numba.cfunc(
+        numba.types.void(rows, blocks, numba.types.int64, flags, numba.types.int64), cache=True, **FLAGS
+    )(function)

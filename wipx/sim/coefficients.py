@@ -33,14 +33,14 @@ class Coefficients:
         joints: And those of each joint, shape (N, BLOCK, P).
         on: Parts of the whole robot that are switched on, shape (FLAGS,).
         has: And of each joint, shape (N, JOINT_FLAGS).
-        parts: Code of the rigid body.
+        rigid: Code of the rigid body (`wipx.sim.cache.part`).
     """
 
     body: np.ndarray
     joints: np.ndarray
     on: np.ndarray
     has: np.ndarray
-    parts: tuple[Any, Any, Any]
+    rigid: Any
 
 
 class _Filler:
@@ -126,8 +126,8 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
     f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
     f.on[R.ON_TIME] = f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
-    body = B.double_body if plant.kind == "double_pendulum" else B.wip_body
-    return Coefficients(f.body, f.joints, f.on, f.has, (body, body, body))
+    rigid = B.double_body if plant.kind == "double_pendulum" else B.wip_body
+    return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 
 def joint_count(plant: Plant) -> int:

@@ -63,11 +63,11 @@ def begin(
 
 
 @cached
-def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, parts):
+def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, rigid):
     """Step s of a row up to the forces that act in mid-step, and where the engine is to stand."""
     if s == 0 or s >= least:
         set_step(S, B, n, has, counts, s)
-    step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, parts)
+    step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
     for w in range(n):
         X.duration[w] = S[R.STEP * W + w]
     for j in range(len(has)):
@@ -83,7 +83,7 @@ def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, 
 
 
 @cached
-def between(S, B, n, X, on, has, parts):
+def between(S, B, n, X, on, has, rigid):
     """The rates at the end of the step from the engine's mass matrix and bias, and the force that leads there."""
     joints = len(has)
     for i in range(joints):
@@ -93,7 +93,7 @@ def between(S, B, n, X, on, has, parts):
                 S[row_of(i, j) * W + w] = X.mass[i, j, w] + (X.rotor[i, w] if i == j else 0.0)
         for w in range(n):
             J[R.FORCE * W + w] -= X.bias[i, w]
-    respond(S, B, n, on, has, parts)
+    respond(S, B, n, on, has, rigid)
     for i in range(joints):
         J = B[i]
         for w in range(n):

@@ -31,14 +31,14 @@ def filled(count):
 
 
 @inlined
-def respond(S, B, n, on, has, parts):
+def respond(S, B, n, on, has, rigid):
     """Friction, and the motion under all forces; the rigid body's mass matrix and forces are known."""
     for j in range(len(has)):
         if has[j, R.ON_LAWS]:
             J = B[j]
             levels(J, n, has, j)
             smooth_friction(S, B, J, n, has, j)
-    rates_at_the_end(S, B, n, on, has, parts)
+    rates_at_the_end(S, B, n, on, has, rigid)
     for j in range(len(has)):
         arrived(B[j], n, has, j)
     if on[R.ON_TIME]:
@@ -47,7 +47,7 @@ def respond(S, B, n, on, has, parts):
 
 
 @inlined
-def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, parts):
+def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
     """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit.
 
     Where an engine moves the rigid body, this ends with the forces that act on it.
@@ -68,8 +68,8 @@ def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, parts):
             S[R.PHASE * W + w] += S[R.PER_ROW * W + w]
     if on[R.ON_ENGINE]:
         return
-    parts[0](S, B, n, on)
-    respond(S, B, n, on, has, parts)
+    rigid(S, B, n, on, R.FORCES)
+    respond(S, B, n, on, has, rigid)
 
 
 @inlined
@@ -174,7 +174,7 @@ def rollout(
     blocks,
     on,
     has,
-    parts,
+    rigid,
     states,
     t_rows,
     u_rows,
@@ -210,7 +210,7 @@ def rollout(
         blocks: And those of each joint, shape (N, BLOCK, P).
         on: Parts of the whole robot that are present, shape (FLAGS,).
         has: And of each joint, shape (N, JOINT_FLAGS).
-        parts: Code of the rigid body: its forces, and what solves for rates (see `wipx.sim.sticking`).
+        rigid: Code of the rigid body (`wipx.sim.cache.part`).
         states: Start of each lane, shape (N, STATES, lanes); overwritten with the end.
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, N, lanes) if `per_lane` (written in closed loop), else (K, N, R).
@@ -277,7 +277,7 @@ def rollout(
             for s in range(most):
                 if s == 0 or s >= least:
                     set_step(S, B, n, has, counts, s)
-                step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, parts)
+                step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)
         record(B, n, on, past, t_rows, lanes, last_row, out, lane0, count)

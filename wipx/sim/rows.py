@@ -96,3 +96,10 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
 ) = range(FLAGS, 100)  # fmt: skip
 LAWS = (ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_PAPER, ON_REMAINDER, ON_SWING)
 MEMORY = (ON_LAG, ON_BACKLASH, ON_PAPER)
+
+# What the code of a rigid body is asked for.
+(
+    FORCES,  # write the mass matrix and add to the forces on the joints
+    SOLVE,  # rates from impulses, and
+    MULTIPLY,  # impulses from rates, where there are more than two joints (`wipx.sim.sticking`)
+) = range(3)

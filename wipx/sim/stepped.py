@@ -224,7 +224,7 @@ class _Run:
         self, block: _Block, world: World, commands, ramps, loop: ClosedLoop | None, controller, out, led, until
     ) -> None:
         """Simulate every row of a block."""
-        on, has, parts, t = self.coefficients.on, self.coefficients.has, self.coefficients.parts, self.inputs.t
+        on, has, rigid, t = self.coefficients.on, self.coefficients.has, self.coefficients.rigid, self.inputs.t
         S, B, X = block.body, block.joints, block.exchange.lanes
         lanes, pointers, counts = block.lanes, block.pointers, block.counts
         first, count = block.first, block.count
@@ -259,9 +259,9 @@ class _Run:
                 loop.settings,
             )
             for s in range(most):
-                before(S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, parts)
+                before(S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, rigid)
                 world.weigh()
-                between(S, B, n, X, on, has, parts)
+                between(S, B, n, X, on, has, rigid)
                 world.advance()
                 after(S, B, n, X)
         show(B, n, on, self.past, t, lanes, self.layout.rows, out, first, count, led, until)

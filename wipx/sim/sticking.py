@@ -27,7 +27,7 @@ def row_of(i, j):
 
 
 @inlined
-def rates_at_the_end(S, B, n, on, has, parts):
+def rates_at_the_end(S, B, n, on, has, rigid):
     """Solve for the rates at the end of the step, and for the inverse mass of joints that ask for it."""
     joints = len(has)
     if on[R.ON_DAMPING]:
@@ -47,7 +47,7 @@ def rates_at_the_end(S, B, n, on, has, parts):
     elif joints == 2:
         two_joints(S, B, n, on)
     else:
-        many_joints(S, B, n, on, has, parts)
+        many_joints(S, B, n, on, has, rigid)
 
 
 @law
@@ -98,30 +98,30 @@ def two_joints(S, B, n, on):
 
 
 @law
-def many_joints(S, B, n, on, has, parts):
-    """Any number of joints; `parts` holds what solves with their mass matrix, and what multiplies with it."""
+def many_joints(S, B, n, on, has, rigid):
+    """Any number of joints; `rigid` holds what solves with their mass matrix, and what multiplies with it."""
     joints = len(has)
     for j in range(joints):
         J = B[j]
         for w in range(n):
             J[R.KEEP * W + w], J[R.HOLD * W + w] = 1.0, 0.0
             J[R.RIGHT * W + w] = J[R.H * W + w] * J[R.FORCE * W + w]
-    parts[1](S, B, n, on)
+    rigid(S, B, n, on, R.SOLVE)
     for j in range(joints):
         J = B[j]
         for w in range(n):
             J[R.NEXT * W + w] += J[R.V * W + w]
     if on[R.ON_FRICTION]:
-        stick_or_slide(S, B, n, on, joints, parts)
+        stick_or_slide(S, B, n, on, joints, rigid)
     for j in range(joints):
         if has[j, R.ON_BACKLASH]:
-            inverse_mass(S, B, n, on, joints, j, parts)
+            inverse_mass(S, B, n, on, joints, j, rigid)
 
 
 @law
-def stick_or_slide(S, B, n, on, joints, parts):
+def stick_or_slide(S, B, n, on, joints, rigid):
     """Rates with friction, from the rates without; rounds until every joint is on the side that its motion asks for."""
-    parts[2](S, B, n, on)  # A times the rates without friction: the impulses c
+    rigid(S, B, n, on, R.MULTIPLY)  # A times the rates without friction: the impulses c
     for j in range(joints):
         J = B[j]
         for w in range(n):
@@ -130,8 +130,8 @@ def stick_or_slide(S, B, n, on, joints, parts):
         for j in range(joints):
             J = B[j]
             held(J, n, on)
-        parts[1](S, B, n, on)
-        parts[2](S, B, n, on)
+        rigid(S, B, n, on, R.SOLVE)
+        rigid(S, B, n, on, R.MULTIPLY)
         moved = 0
         if turn < TOGETHER_UNTIL:
             for j in range(joints):
@@ -185,7 +185,7 @@ def one_moves(S, B, w):
 
 
 @law
-def inverse_mass(S, B, n, on, joints, j, parts):
+def inverse_mass(S, B, n, on, joints, j, rigid):
     """Own entry of joint j in the inverse of A; the rates at the end are kept."""
     for i in range(joints):
         J = B[i]
@@ -193,7 +193,7 @@ def inverse_mass(S, B, n, on, joints, j, parts):
             J[R.AIM * W + w] = J[R.NEXT * W + w]
             J[R.KEEP * W + w], J[R.HOLD * W + w] = 1.0, 0.0
             J[R.RIGHT * W + w] = 1.0 if i == j else 0.0
-    parts[1](S, B, n, on)
+    rigid(S, B, n, on, R.SOLVE)
     for i in range(joints):
         J = B[i]
         for w in range(n):

@@ -9,9 +9,8 @@ import importlib.util
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from wipx.core.tree import Tree
@@ -28,7 +27,8 @@ HEADER = '''"""Rigid body of a robot; written by wipx.sim.tree.code."""
 
 import numpy as np
 
-from wipx.core.law import sin_cos
+from wipx.core.law import law, sin_cos
+from wipx.sim import rows as R
 from wipx.sim.cache import part
 
 U = np.uint64
@@ -50,23 +50,29 @@ def row_count(joints: int) -> int:
     return number_row(joints, joints)
 
 
+FOOTER = """@part
+def rigid(S, B, n, on, asked):
+    if asked == R.FORCES:
+        forces(S, B, n)
+    elif asked == R.SOLVE:
+        solve(S, B, n)
+    else:
+        multiply(S, B, n)
+"""
+
+
 def source(tree: Tree) -> str:
-    """Code of a robot: `forces`, `solve` and `multiply`."""
-    return "\n\n".join([HEADER, _forces(tree), _solve(tree), _multiply(tree)]) + "\n"
+    """Code of a robot."""
+    return "\n\n\n".join([HEADER, _forces(tree), _solve(tree), _multiply(tree), FOOTER])
 
 
-def parts(tree: Tree, announce: Callable[[str], None] = lambda line: None) -> tuple[Any, Any, Any]:
-    """The compiled code of a robot, for `wipx.sim.kernel.rollout`.
-
-    Args:
-        tree: The robot.
-        announce: Told when code has to be compiled, which takes seconds.
-    """
+def rigid_body(tree: Tree) -> Any:
+    """The compiled code of a robot (`wipx.sim.cache.part`); the first use of a robot takes seconds."""
     return _loaded(source(tree))
 
 
 @cache
-def _loaded(text: str) -> tuple[Any, Any, Any]:
+def _loaded(text: str) -> Any:
     name = f"robot_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     path = compiled_folder() / f"{name}.py"
     if not path.is_file():
@@ -79,7 +85,7 @@ def _loaded(text: str) -> tuple[Any, Any, Any]:
     module = importlib.util.module_from_spec(found)
     sys.modules[name] = module
     found.loader.exec_module(module)
-    return module.forces, module.solve, module.multiply
+    return module.rigid
 
 
 def _whole(row: int) -> str:
@@ -91,7 +97,7 @@ def _own(joint: int, row: int) -> str:
 
 
 def _function(name: str, lines: Sequence[str]) -> str:
-    head = ["@part", f"def {name}(S, B, n, on):", "    F = B.ravel()", "    for w in range(U(n)):"]
+    head = ["@law", f"def {name}(S, B, n):", "    F = B.ravel()", "    for w in range(U(n)):"]
     return "\n".join([*head, *(f"        {line}" for line in lines)])
 
 
