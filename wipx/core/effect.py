@@ -12,8 +12,8 @@ import numpy as np
 from wipx.core.parameters import Parameter
 from wipx.core.plant import Plant
 
-JOINT_SITES = ("translation", "pitch", "joint1", "joint2")
-SENSOR_SITES = ("sensor_x", "sensor_theta", "sensor_theta1", "sensor_theta2")
+JOINT_SITES = ("translation", "pitch", "joint1", "joint2", "joint")
+SENSOR_SITES = ("sensor_x", "sensor_theta", "sensor_theta1", "sensor_theta2", "sensor")
 
 Columns = Mapping[str, np.ndarray]
 Coefficient = str | Callable[[Columns, Columns], np.ndarray]
@@ -146,7 +146,7 @@ class Effect:
     Attributes:
         kind: Name in the vocabulary, e.g. "coulomb"; with a site it is "pitch/coulomb".
         words: Its name in a sentence, with "{place}" for the site; lower case but for names such as Coulomb.
-        sites: Sites at which it can act.
+        sites: Sites at which it can act, or their classes (`wipx.core.plant.Plant.class_of`).
         parameters: Numbers of the law.
         law: The equation, as text.
         source: Paper or book.

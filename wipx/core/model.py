@@ -42,12 +42,14 @@ class Model:
     def __reduce__(self):
         # Mapping proxies do not pickle; rebuild from plain dictionaries.
         effects = {k: dict(v) for k, v in self.effects.items()}
-        return _rebuild, (self.plant.kind, dict(self.parameters), effects, dict(self.bandwidths))
+        return Model, (self.plant, dict(self.parameters), effects, dict(self.bandwidths))
 
     def value(self, name: str) -> float:
         """The number of that name: a plant parameter or "site/kind.symbol"."""
+        if name in self.parameters:
+            return self.parameters[name]
         effect, _, symbol = name.rpartition(".")
-        return self.effects[effect][symbol] if effect else self.parameters[symbol]
+        return self.effects[effect][symbol]
 
     def with_values(self, values: Mapping[str, float]) -> "Model":
         """A copy in which the named numbers are replaced."""
@@ -55,20 +57,15 @@ class Model:
         effects = {name: dict(symbols) for name, symbols in self.effects.items()}
         for name, value in values.items():
             effect, _, symbol = name.rpartition(".")
-            (effects[effect] if effect else parameters)[symbol] = float(value)
+            if name in parameters:
+                parameters[name] = float(value)
+            else:
+                effects[effect][symbol] = float(value)
         return replace(self, parameters=parameters, effects=effects)
 
     def with_effects(self, effects: Mapping[str, Mapping[str, float]]) -> "Model":
         """A copy with further effects; those of the same name are replaced."""
         return replace(self, effects={**self.effects, **effects})
-
-
-def _rebuild(
-    kind: str, parameters: dict[str, float], effects: dict[str, dict[str, float]], bandwidths: dict[str, float]
-) -> Model:
-    from wipx.core.plant import plant_of
-
-    return Model(plant_of(kind), parameters, effects, bandwidths)
 
 
 @dataclass(frozen=True)

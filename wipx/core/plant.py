@@ -5,10 +5,12 @@ parameters into the coefficients of these equations.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from wipx.core.drive import Drive
 from wipx.core.errors import InputError, unknown_name
+from wipx.core.tree import Tree
 
 COMMON_SITES = ("actuator", "geometry", "environment")
 
@@ -22,12 +24,14 @@ class PlantParameter:
         meaning: What it is, in words.
         default: Value when the owner gives none; None where one must be given.
         sign: "positive", "non-negative" or "any".
+        absolute: Whether its uncertainty is in its own unit, not relative.
     """
 
     unit: str
     meaning: str
     default: float | None = None
     sign: str = "positive"
+    absolute: bool = False
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,9 @@ class Plant:
         columns: Recorded column of each joint's coordinate, by joint site.
         commands: Recorded columns of the commands.
         actuated: Joint site on which each command acts.
+        sliding: Joint sites that slide; the others turn.
+        tree: Links and joints of a robot that a model file describes; None for the other plants.
+        drives: What moves each joint of such a robot, by joint.
     """
 
     kind: str
@@ -47,6 +54,15 @@ class Plant:
     columns: Mapping[str, str]
     commands: tuple[str, ...]
     actuated: tuple[str, ...]
+    sliding: frozenset[str]
+    tree: Tree | None = field(default=None, compare=False)
+    drives: Mapping[str, Drive] = field(default_factory=dict)
+
+    def __reduce__(self):
+        # Mapping proxies do not pickle.
+        if self.tree is None:
+            return plant_of, (self.kind,)
+        return robot_plant, (self.tree, dict(self.drives))
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -61,30 +77,49 @@ class Plant:
     @property
     def rates(self) -> tuple[str, ...]:
         """Recorded columns of the joints' rates (optional in a recording), in the order of q."""
-        return tuple(RATE_OF[name] for name in self.coordinates)
+        return tuple(f"{name}_dot" for name in self.coordinates)
 
     @property
     def sites(self) -> tuple[str, ...]:
         """Every site at which physics can be missing."""
         sensors = tuple(f"sensor_{column}" for column in self.coordinates)
-        return (*self.joints, *COMMON_SITES, *sensors)
+        if self.tree is None:
+            return (*self.joints, *COMMON_SITES, *sensors)
+        drives = tuple(f"actuator_{joint}" for joint in self.actuated)
+        links = tuple(f"link_{link.body}" for link in self.tree.links)
+        return (*self.joints, "actuator", *drives, *sensors, *links, "environment")
+
+    def class_of(self, site: str) -> str:
+        """How effects name a site among those at which they can act (`wipx.core.effect.Effect.sites`).
+
+        The sites of a robot from a model file are classes: "joint", "drive", "drives" (all at once), "sensor", "link",
+        "base"; those of the other plants stand for themselves.
+        """
+        if self.tree is None:
+            return site
+        if site in self.columns:
+            return "joint"
+        first = site.partition("_")[0]
+        return {"actuator": "drives" if site == "actuator" else "drive", "environment": "base"}.get(first, first)
 
     def is_angular(self, site: str) -> bool:
-        """Whether forces at `site` are torques: turning joints and the actuator of a turning joint."""
-        if site in self.columns:
-            return self.columns[site] != "x"
-        if site.startswith("sensor_"):
-            return site != "sensor_x"
-        if site == "actuator":
-            return self.columns[self.actuated[0]] != "x"
+        """Whether forces at `site` are torques: turning joints, their actuators and sensors."""
+        if site in self.columns or site.startswith(("sensor_", "actuator")):
+            return self.joint_at(site) not in self.sliding
         return False
 
     def joint_at(self, site: str) -> str:
-        """The joint that physics at `site` is felt at first: itself, that of a sensor, else the driven one."""
+        """The joint that physics at `site` is felt at first.
+
+        Itself, that of a sensor, a drive or the link that it moves, else the first driven one.
+        """
         if site in self.columns:
             return site
-        measured = {f"sensor_{column}": joint for joint, column in self.columns.items()}
-        return measured.get(site, self.actuated[0])
+        found = {f"sensor_{column}": joint for joint, column in self.columns.items()}
+        found |= {f"actuator_{joint}": joint for joint in self.actuated}
+        if self.tree is not None:
+            found |= {f"link_{link.body}": link.joint for link in self.tree.links}
+        return found.get(site, self.actuated[0] if self.actuated else self.joints[0])
 
     def joints_at(self, site: str) -> tuple[str, ...]:
         """The joints at which an effect at `site` acts: all that are driven for a common actuator."""
@@ -94,9 +129,20 @@ class Plant:
 
     def unit_of(self, column: str) -> str:
         """SI unit of a recorded column."""
-        if column in self.commands or column.startswith("u"):
-            return "N m" if self.is_angular("actuator") else "N"
-        return COLUMN_UNITS[column]
+        if column == "t":
+            return "s"
+        measured = {f"{name}_measured": name for name in self.commands}
+        command = measured.get(column, column)
+        if command in self.commands:
+            joint = self.actuated[self.commands.index(command)]
+            slides = joint in self.sliding
+            if column == command and joint in self.drives and self.drives[joint].kind == "position":
+                return "m" if slides else "rad"
+            return "N" if slides else "N m"
+        name = column.removesuffix("_ref")
+        joints = {coordinate: joint for joint, coordinate in self.columns.items()}
+        unit = "m" if joints[name.removesuffix("_dot")] in self.sliding else "rad"
+        return f"{unit}/s" if name.endswith("_dot") else unit
 
     def complete(self, values: Mapping[str, float], where: str) -> dict[str, float]:
         """Check the owner's parameters and fill in the optional ones.
@@ -127,23 +173,7 @@ class Plant:
         return float(value)
 
 
-RATE_OF = MappingProxyType({"x": "x_dot", "theta": "theta_dot", "theta1": "theta1_dot", "theta2": "theta2_dot"})
-COLUMN_UNITS = MappingProxyType(
-    {
-        "t": "s",
-        "x": "m",
-        "theta": "rad",
-        "theta1": "rad",
-        "theta2": "rad",
-        "x_dot": "m/s",
-        "theta_dot": "rad/s",
-        "theta1_dot": "rad/s",
-        "theta2_dot": "rad/s",
-        "x_ref": "m",
-        "theta_ref": "rad",
-        "x_dot_ref": "m/s",
-    }
-)
+REFERENCES = ("x_ref", "theta_ref", "x_dot_ref")  # columns of references that a recording may have
 
 _GRAVITY = PlantParameter("m/s^2", "gravity", 9.81)
 _GAIN = PlantParameter("N or N m per unit of u", "input gain", 1.0, "any")
@@ -170,7 +200,8 @@ def _link(number: int) -> dict[str, PlantParameter]:
 
 def _plant(kind: str, parameters: Mapping[str, PlantParameter], columns: dict[str, str], actuated: tuple[str, ...]):
     commands = ("u",) if len(actuated) == 1 else tuple(f"u{i + 1}" for i in range(len(actuated)))
-    return Plant(kind, MappingProxyType(dict(parameters)), MappingProxyType(columns), commands, actuated)
+    sliding = frozenset({"translation"} & columns.keys())
+    return Plant(kind, MappingProxyType(dict(parameters)), MappingProxyType(columns), commands, actuated, sliding)
 
 
 _WHEEL_FREE = {
@@ -216,3 +247,48 @@ def plant_of(kind: str, where: str = "plant") -> Plant:
     if kind not in PLANTS:
         raise unknown_name("plant", kind, PLANTS, where)
     return PLANTS[kind]
+
+
+def robot_plant(tree: Tree, drives: Mapping[str, Drive]) -> Plant:
+    """The plant of a robot that a model file describes; contract section 6.
+
+    Args:
+        tree: Its links and joints.
+        drives: What moves each joint; joints that are left out have a torque drive.
+    """
+    full = {link.joint: drives.get(link.joint, Drive()) for link in tree.links}
+    parameters: dict[str, PlantParameter] = {}
+    for link in tree.links:
+        com = link.body_rotation.T @ (link.com - link.body_place)
+        body = link.body
+        parameters[f"{body}.mass"] = PlantParameter("kg", f"mass of {body}", link.mass, "non-negative")
+        for axis, place in zip("xyz", com.tolist(), strict=True):
+            meaning = f"centre of mass of {body} along {axis} of its frame"
+            parameters[f"{body}.com_{axis}"] = PlantParameter("m", meaning, place, "any", absolute=True)
+        parameters[f"{body}.inertia"] = PlantParameter("1", f"scale of the inertia of {body}", 1.0)
+        unit = "N s/m" if link.slides else "N m s/rad"
+        force, inertia = ("N", "kg") if link.slides else ("N m", "kg m^2")
+        for name, of, value in (
+            ("damping", unit, link.damping),
+            ("friction", force, link.friction),
+            ("armature", inertia, link.armature),
+        ):
+            parameters[f"{link.joint}.{name}"] = PlantParameter(of, f"{name} of {link.joint}", value, "non-negative")
+        drive = full[link.joint]
+        if drive.kind == "torque":
+            parameters[f"{link.joint}.gain"] = PlantParameter(f"{force} per unit", "of the drive", drive.gain, "any")
+        if drive.kind == "position":
+            stiffness = "N/m" if link.slides else "N m/rad"
+            parameters[f"{link.joint}.kp"] = PlantParameter(stiffness, "of the drive", drive.kp)
+            parameters[f"{link.joint}.kd"] = PlantParameter(unit, "of the drive", drive.kd, "non-negative")
+    actuated = tuple(joint for joint, drive in full.items() if drive.kind != "none")
+    return Plant(
+        "robot",
+        MappingProxyType(parameters),
+        MappingProxyType({joint: joint for joint in tree.joints}),
+        tuple(f"u_{joint}" for joint in actuated),
+        actuated,
+        frozenset(link.joint for link in tree.links if link.slides),
+        tree,
+        MappingProxyType(full),
+    )

@@ -1,7 +1,7 @@
 """A robot as an open tree of links, each carried by one hinge or slide.
 
-A link's frame has its origin on the joint's axis and z along it; at position zero of the joint it stands in its parent's
-frame as `rotation` and `place` say. The ground is number -1.
+A link's frame has its origin on the joint's axis and z along it; at position zero of the joint it stands in its
+parent's frame as `rotation` and `place` say. The ground is number -1.
 """
 
 from dataclasses import dataclass

@@ -17,7 +17,7 @@ from wipx.effects.lag import rate_of
 EFFECT = Effect(
     kind="backlash",
     words="backlash of the drive",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(
         Parameter(
             "gap",

@@ -6,7 +6,7 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="bias",
     words="constant error (bias) of {place}",
-    sites=("sensor_theta", "sensor_theta1", "sensor_theta2"),
+    sites=("sensor_theta", "sensor_theta1", "sensor_theta2", "sensor"),
     parameters=(Parameter("b", "recorded minus true angle", "angle", 0.0, -0.5, 0.5, 0.0, grid=(0.01,)),),
     law="recorded = theta + b",
     linear_in=("b",),

@@ -5,11 +5,13 @@ from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
+from types import ModuleType
 
 from wipx import effects
 from wipx.core.effect import Effect
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.plant import Plant
+from wipx.effects import trees
 
 _REGISTERED: dict[str, Effect] = {}  # from elsewhere, by kind
 
@@ -20,9 +22,13 @@ def kinds() -> dict[str, Effect]:
 
 
 def kind_of(name: str) -> Effect:
-    """The effect that a name "site/kind" means."""
-    kind = name.partition("/")[2]
-    return _REGISTERED.get(kind) or _of_this_package()[kind]
+    """The effect that a name "site/kind" means.
+
+    Some kinds act otherwise at links and joints of a robot from a model file than at the sites of the other plants.
+    """
+    site, _, kind = name.partition("/")
+    known = kinds().get(kind)
+    return known if known is not None and (site in known.sites or kind not in of_trees()) else of_trees()[kind]
 
 
 @contextmanager
@@ -43,8 +49,18 @@ def registered(effect: Effect) -> Iterator[Effect]:
 
 @cache
 def _of_this_package() -> dict[str, Effect]:
-    names = sorted(module.name for module in iter_modules(effects.__path__))
-    modules = (import_module(f"{effects.__name__}.{name}") for name in names)
+    return _found_in(effects)
+
+
+@cache
+def of_trees() -> dict[str, Effect]:
+    """Effects that act on robots from a model file only, by kind."""
+    return _found_in(trees)
+
+
+def _found_in(package: ModuleType) -> dict[str, Effect]:
+    names = sorted(module.name for module in iter_modules(package.__path__) if not module.ispkg)
+    modules = (import_module(f"{package.__name__}.{name}") for name in names)
     found = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]
     return {effect.kind: effect for effect in found}
 
@@ -52,11 +68,16 @@ def _of_this_package() -> dict[str, Effect]:
 def vocabulary(plant: Plant) -> dict[str, Effect]:
     """The effects that can act on a plant, by "site/kind"."""
     have = {*plant.joints, *plant.parameters}
+    every = (*kinds().values(), *(of_trees().values() if plant.tree is not None else ()))
+    sites: dict[str, list[str]] = {}
+    for site in plant.sites:
+        sites.setdefault(plant.class_of(site), []).append(site)
     return {
         f"{site}/{effect.kind}": effect
-        for effect in kinds().values()
-        for site in effect.sites
-        if site in plant.sites and have.issuperset(effect.needs)
+        for effect in every
+        for at in effect.sites
+        for site in sites.get(at, ())
+        if have.issuperset(effect.needs)
     }
 
 

@@ -14,7 +14,7 @@ def _steady(command, p, body):
 EFFECT = Effect(
     kind="dead_zone",
     words="dead zone of {place}",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(Parameter("band", "half width", "force", 0.0, 0.0, 0.5, 0.02, grid=(0.01, 0.05, 0.2)),),
     law="0 for abs(u) < band, else u - band s(u)",
     linear_in=("band",),

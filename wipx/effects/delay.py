@@ -6,7 +6,7 @@ from wipx.core.parameters import Parameter
 EFFECT = Effect(
     kind="delay",
     words="delay of {place}",
-    sites=("actuator", *SENSOR_SITES),
+    sites=("actuator", "drive", "drives", *SENSOR_SITES),
     parameters=(
         Parameter("tau", "delay", "time", 0.0, 0.0, 0.15, 0.003, grid=(0.003, 0.006, 0.01, 0.015, 0.022, 0.03)),
     ),

@@ -11,7 +11,7 @@ def _steady(command, p, body):
 EFFECT = Effect(
     kind="gain",
     words="wrong gain of {place}",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(Parameter("k", "force per commanded force", "ratio", 1.0, 0.2, 5.0, 1.0, grid=(0.9, 1.1)),),
     law="F = k u",
     linear_in=("k",),

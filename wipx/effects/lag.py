@@ -16,7 +16,7 @@ def rate_of(time):
 EFFECT = Effect(
     kind="lag",
     words="first-order lag of {place}",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(Parameter("tau", "time constant", "time", 0.0, 0.0, 0.3, 0.003, grid=(0.003, 0.01, 0.03)),),
     law="tau F' + F = u",
     linear_in=("tau",),

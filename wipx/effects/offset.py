@@ -13,7 +13,7 @@ def _steady(command, p, body):
 EFFECT = Effect(
     kind="offset",
     words="constant force offset of {place}",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(Parameter("F_0", "force at zero command", "force", 0.0, -0.5, 0.5, 0.0, grid=(0.02,)),),
     law="F = u + F_0",
     linear_in=("F_0",),

@@ -14,7 +14,7 @@ def _steady(command, p, body):
 EFFECT = Effect(
     kind="saturation",
     words="saturation of {place}",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(
         Parameter(
             "F_max",

@@ -14,7 +14,7 @@ def _is_out_of_reach(fitted: FittedEffect) -> bool:
 EFFECT = Effect(
     kind="speed_limit",
     words="torque-speed limit of the motor",
-    sites=("actuator",),
+    sites=("actuator", "drive"),
     parameters=(
         Parameter(
             "F_stall",

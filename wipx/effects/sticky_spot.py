@@ -17,7 +17,7 @@ def _is_the_whole_way(fitted: FittedEffect) -> bool:
 EFFECT = Effect(
     kind="sticky_spot",
     words="sticky spot on the rail",
-    sites=("translation",),
+    sites=("translation", "joint"),
     parameters=(
         Parameter("F_c", "extra level", "force", 0.0, 0.0, 1.0, 0.05),
         Parameter("lo", "where it begins", "coordinate", 0.0, -1.0, 1.0, -0.1),

@@ -5,7 +5,7 @@ Words begin in lower case (but for names such as Coulomb), so that they fit into
 
 from types import MappingProxyType
 
-from wipx.effects.catalogue import kinds
+from wipx.effects.catalogue import kind_of, kinds, of_trees
 
 _PLACES = MappingProxyType(
     {
@@ -51,6 +51,6 @@ def _one_effect(name: str, plant_kind: str) -> str:
     site, _, kind = name.partition("/")
     if not kind:
         return name
-    effect = kinds().get(kind)
+    effect = kind_of(name) if kind in kinds() or kind in of_trees() else None
     words = effect.words if effect else f"{kind.replace('_', ' ')} of {{place}}"
     return words.format(place=site_in_words(site, plant_kind))

@@ -11,6 +11,7 @@ from wipx.core.parameters import FreeParameter, Scales
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.effects.catalogue import effect_of
+from wipx.sim.tree.inertias import rest_inertia
 
 LOGARITHMIC = 50.0  # bounds further apart than this factor are searched on a logarithmic scale
 FREE_RANGE = 30.0  # a freed plant parameter may lie within this factor of its nominal value
@@ -159,13 +160,14 @@ def _nominal_parameter(name: str, model: Model, deviation: float | None) -> Free
     value = model.value(name)
     size = abs(value)
     effect, _, symbol = name.rpartition(".")
-    if effect:
+    if name not in model.parameters:
         spec = next(p for p in effect_of(effect, model.plant).parameters if p.name == symbol)
         unit = spec.unit(angular=model.plant.is_angular(effect.partition("/")[0]))
         lowest = 0.0 if spec.low >= 0.0 else -np.inf
     else:
-        unit = model.plant.parameters[symbol].unit
-        lowest = value / FREE_RANGE if value > 0.0 else -np.inf
+        known = model.plant.parameters[name]
+        unit, size = known.unit, 1.0 if known.absolute else size
+        lowest = value / FREE_RANGE if value > 0.0 and not known.absolute else -np.inf
     if deviation is not None:
         reach = PRIOR_RANGE * deviation * size
         low = max(value - reach, lowest)
@@ -191,8 +193,9 @@ def scales_of(model: Model, recordings: tuple[Recording, ...]) -> dict[str, Scal
     joints = {site: _joint_scales(model, site, column, recordings) for site, column in plant.columns.items()}
     first = next(iter(joints.values()))
     everywhere = {site: first for site in plant.sites}
-    sensors = {f"sensor_{column}": joints[site] for site, column in plant.columns.items()}
-    return {**everywhere, **sensors, "actuator": joints[plant.actuated[0]], **joints}
+    own = {site: joints[plant.joint_at(site)] for site in plant.sites if plant.joint_at(site) != plant.joints[0]}
+    own |= {f"sensor_{column}": joints[site] for site, column in plant.columns.items()}
+    return {**everywhere, **own, "actuator": joints[plant.joint_at("actuator")], **joints}
 
 
 def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Recording, ...]) -> Scales:
@@ -203,12 +206,31 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     commanded = np.zeros(1)
     if site in plant.actuated:
         command = plant.commands[plant.actuated.index(site)]
-        commanded = np.abs(np.concatenate([r[command] for r in recordings])) * abs(p["input_gain"])
+        recorded = np.concatenate([r[command] for r in recordings])
+        commanded = np.abs(_asked(model, site, recorded, np.concatenate([r[column] for r in recordings])))
     force = max(float(np.quantile(commanded, 0.99)), _inertia(model, site) * velocity / 0.1)
     largest = max(float(commanded.max()), 1e-6 * force)
-    mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
-    length = p.get("com_height", p.get("link1_length", 1.0))
+    if plant.tree is not None:
+        body = next(link.body for link in plant.tree.links if link.joint == site)
+        reach = [float(np.linalg.norm(link.place)) for link in plant.tree.links if link.place.any()]
+        mass, length = sum(p[f"{link.body}.mass"] for link in plant.tree.links), max(reach, default=1.0)
+        mass = max(p[f"{body}.mass"], 0.1 * mass)
+    else:
+        mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
+        length = p.get("com_height", p.get("link1_length", 1.0))
     return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings), largest)
+
+
+def _asked(model: Model, site: str, command: np.ndarray, coordinate: np.ndarray) -> np.ndarray:
+    """Force that a command asks for [N or N m], shape (N,)."""
+    p = model.parameters
+    drive = model.plant.drives.get(site)
+    if drive is None:
+        return command * p["input_gain"]
+    if drive.kind == "torque":
+        return command * p[f"{site}.gain"]
+    force = (command - coordinate) * p[f"{site}.kp"]
+    return force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
 
 
 def _speeds(t: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -219,6 +241,8 @@ def _speeds(t: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 def _inertia(model: Model, site: str) -> float:
     p = model.parameters
+    if model.plant.tree is not None:
+        return float(rest_inertia(model.plant.tree)[model.plant.joints.index(site)])
     if site == "translation":
         return p["body_mass"] + p["wheel_mass"] + p["wheel_inertia"] / p["wheel_radius"] ** 2
     if site == "pitch":

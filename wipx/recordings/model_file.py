@@ -23,9 +23,11 @@ from wipx.core.model import Model
 from wipx.core.plant import PLANTS, Plant, plant_of
 from wipx.effects.catalogue import check_together, effect_of
 from wipx.recordings.strict_yaml import finite_number, load_mapping
+from wipx.recordings.tree_file import plant_from_mapping, plant_to_mapping
 
 SCHEMA = 1
-MODEL_KEYS = ("plant", "parameters", "effects", "bandwidths")
+ROBOT = "robot"  # plant whose mechanics a model file gives
+MODEL_KEYS = ("plant", "parameters", "effects", "bandwidths", "model", "locked", "drives", "tree")
 ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads")
 
 
@@ -37,6 +39,7 @@ def write_model(model: Model, path: Path) -> None:
     content = {
         "schema": SCHEMA,
         "plant": model.plant.kind,
+        **(plant_to_mapping(model.plant) if model.plant.tree is not None else {}),
         "parameters": _plain(model.parameters),
         "effects": {name: _plain(values) for name, values in model.effects.items()},
     }
@@ -63,23 +66,28 @@ def read_model(path: Path) -> Model:
     schema = data.get("schema", SCHEMA)
     if schema != SCHEMA:
         raise InputError(f"{where}: schema is {schema!r}, expected {SCHEMA}; write the model again")
-    return model_from_mapping(data, where)
+    return model_from_mapping(data, where, path.parent)
 
 
-def model_from_mapping(data: Mapping[str, object], where: str) -> Model:
+def model_from_mapping(data: Mapping[str, object], where: str, folder: Path | None = None) -> Model:
     """The model that the keys plant, parameters and effects describe.
 
     Args:
         data: Content of a file or of a configuration; further keys are left alone.
         where: File or key that holds it, for messages.
+        folder: That paths in it are relative to; None for the present one.
 
     Raises:
         InputError: see `read_model`.
     """
-    for key in ("plant", "parameters"):
+    is_robot = data.get("plant") == ROBOT
+    for key in ("plant",) if is_robot else ("plant", "parameters"):
         if data.get(key) is None:
-            raise InputError(f"{where}: {key} is missing; add it (plants: {', '.join(sorted(PLANTS))})")
-    plant = plant_of(str(data["plant"]), f"{where}: plant")
+            raise InputError(f"{where}: {key} is missing; add it (plants: {', '.join(sorted((*PLANTS, ROBOT)))})")
+    if is_robot:
+        plant = plant_from_mapping(data, where, folder or Path())
+    else:
+        plant = plant_of(str(data["plant"]), f"{where}: plant")
     parameters = plant.complete(mapping_of(data, "parameters", where), f"{where}: parameters")
     listed = mapping_of(data, "effects", where)
     check_together(tuple(listed), plant, f"{where}: effects")

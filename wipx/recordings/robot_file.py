@@ -103,21 +103,22 @@ def read_robot(path: Path) -> RobotDescription:
     Raises:
         InputError: the file is missing or no plain YAML, or its content is at fault.
     """
-    return robot_from_mapping(load_mapping(path), str(path))
+    return robot_from_mapping(load_mapping(path), str(path), path.parent)
 
 
-def robot_from_mapping(data: Mapping[str, object], where: str) -> RobotDescription:
+def robot_from_mapping(data: Mapping[str, object], where: str, folder: Path | None = None) -> RobotDescription:
     """The description that the keys of a robot.yaml give.
 
     Args:
         data: Content of the file, or the same keys in a configuration.
         where: File or key that holds it, for messages.
+        folder: That paths in it are relative to; None for the present one.
 
     Raises:
         InputError: a key, parameter, effect, column or unit is unknown, missing or at fault.
     """
     check_keys(data, ROBOT_KEYS, where)
-    model = model_from_mapping(data, where)
+    model = model_from_mapping(data, where, folder)
     listed = mapping_of(data, "signals", where)
     signals = {n: signal_from_mapping(n, listed[n], model.plant, f"{where}: signals") for n in listed}
     uncertainty = _uncertainty(mapping_of(data, "uncertainty", where), model, f"{where}: uncertainty")
@@ -129,7 +130,7 @@ def robot_from_mapping(data: Mapping[str, object], where: str) -> RobotDescripti
 
 def _check_input_gain(signals: Mapping[str, Signal], plant: Plant, *, given: bool, where: str) -> None:
     """A command in volts or without unit needs a gain to become a force or a torque."""
-    for name in plant.commands:
+    for name in plant.commands if "input_gain" in plant.parameters else ():
         if name in signals and UNITS[signals[name].unit].si in COMMAND_UNITS and not given:
             unit = signals[name].unit
             raise InputError(
@@ -142,14 +143,17 @@ def _uncertainty(data: Mapping[str, object], model: Model, where: str) -> dict[s
     valid = (*model.parameters, *symbols)
     stds = {}
     for name, given in data.items():
-        if name not in valid:
+        axes = [f"{name}_{axis}" for axis in "xyz"]
+        names = axes if name not in valid and set(axes) <= set(valid) else [name]
+        if names[0] not in valid:
             raise unknown_name("parameter", name, valid, where)
         std = finite_number(given)
         if std is None or std <= 0.0:
             raise InputError(f"{where}: {name} is {given!r}, expected a relative standard deviation above 0, e.g. 0.1")
-        if model.value(name) == 0.0:
+        spec = model.plant.parameters.get(names[0])
+        if model.value(names[0]) == 0.0 and not (spec is not None and spec.absolute):
             raise InputError(f"{where}: {name} is relative, but the value itself is 0; give a value or drop it")
-        stds[name] = std
+        stds.update(dict.fromkeys(names, std))
     return stds
 
 

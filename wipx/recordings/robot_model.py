@@ -149,7 +149,7 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
 
 
 def _carriers(model: Any, number: dict[int, int]) -> dict[int, int]:
-    """The link that carries each body: that of its last joint which moves, else that of the body below; -1 the ground."""
+    """The link that carries each body: of its last joint that moves, else of the body below; -1 for the ground."""
     carrier = {0: -1}
     for body in range(1, model.nbody):
         first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from wipx.core.errors import InputError, unknown_name
-from wipx.core.plant import COLUMN_UNITS, Plant
+from wipx.core.plant import REFERENCES, Plant
 from wipx.recordings.strict_yaml import finite_number
 from wipx.recordings.units import check_unit, factor_to_si
 
@@ -69,7 +69,7 @@ def recorded_columns(plant: Plant) -> tuple[str, ...]:
     """Every column that a recording of the plant may have, time first."""
     measured = tuple(f"{command}_measured" for command in plant.commands)
     known = (*plant.coordinates, *plant.rates)
-    references = tuple(f"{name}_ref" for name in known if f"{name}_ref" in COLUMN_UNITS)
+    references = tuple(f"{name}_ref" for name in known if f"{name}_ref" in REFERENCES)
     return ("t", *plant.coordinates, *plant.commands, *plant.rates, *measured, *references)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.diagnosis import ConsideredEffect, Curve, Diagnosis, ErrorMap
-from wipx.core.plant import COLUMN_UNITS
 from wipx.effects.words import effect_in_words, site_in_words
 from wipx.report.charts import comparison_data, json_number
 from wipx.report.diagnosis_words import capitalised
@@ -166,7 +165,7 @@ def _reference(diagnosis: Diagnosis) -> dict | None:
         "columns": [
             {
                 "name": name,
-                "unit": diagnosis.units.get(name, COLUMN_UNITS.get(name, "")),
+                "unit": diagnosis.units.get(name, diagnosis.nominal.plant.unit_of(name)),
                 "values": _numbers(values[rows]),
             }
             for name, values in following.reference.items()

@@ -65,7 +65,7 @@ def _is_compiled(node: ast.stmt) -> bool:
 
 @cache
 def compiled_folder() -> Path:
-    """Folder of compiled code, named after its sources; NUMBA_CACHE_DIR moves what numba keeps, not what is written here."""
+    """Folder of compiled code, named after its sources; NUMBA_CACHE_DIR moves only what numba keeps itself."""
     digest = sources_digest(PACKAGE)
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = home / "wipx" / digest

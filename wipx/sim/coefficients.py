@@ -15,10 +15,14 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
+from wipx.core.tree import Tree
 from wipx.effects.catalogue import kind_of, kinds
 from wipx.effects.payload import loaded
 from wipx.sim import body as B
 from wipx.sim import rows as R
+from wipx.sim.tree import code
+from wipx.sim.tree import equations as E
+from wipx.sim.tree.inertias import gravity, inertial_numbers
 
 Columns = Mapping[str, np.ndarray]
 ON = "ON_"  # names of flags begin so
@@ -50,7 +54,7 @@ class _Filler:
         self.batch = batch
         self.effects = batch.model.effects
         self.plant = batch.model.plant
-        self.body = np.zeros((B.ROWS, batch.size))
+        self.body = np.zeros((body_rows(self.plant), batch.size))
         self.joints = np.repeat(_neutral_block(tuple(kinds()))[None, :, None], joint_count(self.plant), axis=0)
         self.joints = np.repeat(self.joints, batch.size, axis=2)
         self.on = np.zeros(R.FLAGS, dtype=np.bool_)
@@ -111,33 +115,41 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     """
     f = _Filler(batch)
     plant = f.plant
-    f.body[[B.MASS, B.INERTIA]] = 1.0  # of a joint that the plant lacks
     f.add_effects()
-    if plant.kind == "double_pendulum":
-        _double_pendulum(f)
+    if plant.tree is not None:
+        rigid = _tree(f, plant.tree)
+    elif plant.kind == "double_pendulum":
+        rigid = _double_pendulum(f)
     else:
-        _wip_family(f)
+        rigid = _wip_family(f)
     for site in plant.actuated:
-        f.joints[joint_index(plant, site), R.INPUT_GAIN] = batch.column("input_gain")
-        f.has[joint_index(plant, site), R.ACTUATED] = True
+        j = joint_index(plant, site)
+        f.has[j, R.ACTUATED] = True
+        f.joints[j, R.INPUT_GAIN] = _input_gain(f, site)
     for site, speed in zip(plant.joints, smoothing, strict=False):
         f.joints[joint_index(plant, site), R.SMOOTHING] = speed
         f.on[R.ON_SMOOTHING] = True
     f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
     f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
     f.on[R.ON_TIME] = f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
-    rigid = B.double_body if plant.kind == "double_pendulum" else B.wip_body
     return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 
 def joint_count(plant: Plant) -> int:
     """Joints of a plant in the kernel."""
-    return B.JOINTS
+    return B.JOINTS if plant.tree is None else len(plant.joints)
 
 
 def joint_index(plant: Plant, site: str) -> int:
     """Number of a joint in the kernel."""
+    if plant.tree is not None:
+        return plant.joints.index(site)
     return {"translation": 0, "joint1": 0, "pitch": 1, "joint2": 1}[site]
+
+
+def body_rows(plant: Plant) -> int:
+    """Rows of the whole robot."""
+    return B.ROWS if plant.tree is None else code.row_count(len(plant.joints))
 
 
 def row_at(name: str, site: str) -> int:
@@ -154,13 +166,14 @@ def row_at(name: str, site: str) -> int:
 
 def joints_of(name: str, site: str, plant: Plant) -> list[int]:
     """Joints whose blocks have the row or flag of that name for an effect at a site; -1 for the whole robot."""
-    if hasattr(B, name) or (name.startswith(ON) and row_at(name, site) < R.FLAGS):
+    if (plant.tree is None and hasattr(B, name)) or (name.startswith(ON) and row_at(name, site) < R.FLAGS):
         return [-1]
     return [joint_index(plant, joint) for joint in plant.joints_at(site)]
 
 
-def _wip_family(f: _Filler) -> None:
+def _wip_family(f: _Filler) -> Any:
     """Contract section 2: wip, and cartpole, pendulum and linear_axis as its special cases."""
+    f.body[[B.MASS, B.INERTIA]] = 1.0  # of a joint that the plant lacks
     plain = _rigid_body(f, with_event=False)
     for row, value in zip((B.MASS, B.COUPLING, B.INERTIA, B.GRAVITY), plain[:4], strict=True):
         f.body[row] = value
@@ -170,6 +183,7 @@ def _wip_family(f: _Filler) -> None:
         for row, after, before in zip(deltas, loaded_body, plain, strict=True):
             f.body[row] = after - before
     f.body[B.TILT_FORCE] = plain[4]
+    return B.wip_body
 
 
 def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
@@ -205,7 +219,7 @@ def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
     return mass, coupling, turning, body * gravity * com, weight
 
 
-def _double_pendulum(f: _Filler) -> None:
+def _double_pendulum(f: _Filler) -> Any:
     """Double pendulum, theta1 = 0 hanging, theta2 relative to link 1; inertias about the joints."""
     column = f.batch.column
     mass1, mass2 = column("link1_mass"), column("link2_mass")
@@ -216,3 +230,29 @@ def _double_pendulum(f: _Filler) -> None:
     f.body[B.DP_COUPLING] = mass2 * length1 * com2
     f.body[B.DP_GRAVITY] = mass2 * com2 * gravity
     f.body[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
+    return B.double_body
+
+
+def _tree(f: _Filler, tree: Tree) -> Any:
+    """A robot from a model file: inertial numbers of its links, and what the file gives its joints beside effects."""
+    joints = len(tree.links)
+    first = code.gravity_row(joints)
+    f.body[first : first + code.GRAVITY] = gravity(f.batch, tree)
+    for i, link in enumerate(tree.links):
+        first = code.number_row(joints, i)
+        f.body[first : first + E.NUMBERS] = inertial_numbers(f.batch, link)
+        damping, friction, armature = (
+            f.batch.column(f"{link.joint}.{name}") for name in ("damping", "friction", "armature")
+        )
+        f.joints[i, R.VISCOUS] += damping
+        f.joints[i, R.ROTOR] += armature
+        f.joints[i, [R.LEVEL_PLUS, R.LEVEL_MINUS]] += friction
+        f.on[R.ON_DAMPING] |= bool(damping.any())
+        f.on[R.ON_FRICTION] |= bool(friction.any())
+    return code.rigid_body(tree)
+
+
+def _input_gain(f: _Filler, site: str) -> np.ndarray:
+    """Force of a drive per unit of its command, shape (P,)."""
+    name = "input_gain" if f.plant.tree is None else f"{site}.gain"
+    return f.batch.column(name) if name in f.plant.parameters else np.ones(f.batch.size)

@@ -81,7 +81,8 @@ def _loaded(text: str) -> Any:
             file.write(text)
         os.replace(file.name, path)
     found = importlib.util.spec_from_file_location(name, path)
-    assert found is not None and found.loader is not None
+    assert found is not None
+    assert found.loader is not None
     module = importlib.util.module_from_spec(found)
     sys.modules[name] = module
     found.loader.exec_module(module)

@@ -178,7 +178,7 @@ def mass_matrix(
 
 
 def solution(tree: Tree, matrix: dict[tuple[int, int], Scalar], right: Sequence[Scalar]) -> list[Scalar]:
-    """x with A x = right, for a symmetric A with the zeros of a mass matrix: A = L' D L from the leaves down."""
+    """X with A x = right, for a symmetric A with the zeros of a mass matrix: A = L' D L from the leaves down."""
     a, x = dict(matrix), list(right)
     inverse: dict[int, Scalar] = {}
     lower: dict[tuple[int, int], Scalar] = {}

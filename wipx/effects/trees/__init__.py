@@ -1,0 +1,1 @@
+"""Effects that act on robots from a model file otherwise than on the other plants; contract section 6."""

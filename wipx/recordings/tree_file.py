@@ -1,0 +1,104 @@
+"""Robots from model files in robot.yaml, and in a model.yaml, which holds the tree itself; contract section 6."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from wipx.core.drive import Drive, Logged
+from wipx.core.errors import InputError, unknown_name
+from wipx.core.plant import Plant, robot_plant
+from wipx.core.tree import Link, Tree
+from wipx.recordings.robot_model import read_tree
+from wipx.recordings.strict_yaml import finite_number
+
+KINDS = ("torque", "position", "none")
+DRIVE_KEYS = {"torque": ("kind", "gain", "logged"), "position": ("kind", "kp", "kd", "limit", "rate", "logged")}
+ARRAYS = ("rotation", "place", "com", "inertia", "body_rotation", "body_place")
+
+
+def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> Plant:
+    """The plant of a robot.yaml or model.yaml with `plant: robot`.
+
+    Args:
+        data: Content of the file: `model`, `locked`, `drives`; or `tree`, `drives`.
+        where: File, for messages.
+        folder: That the path `model` is relative to.
+
+    Raises:
+        InputError: the model file or a drive is missing or at fault.
+    """
+    if data.get("tree") is not None:
+        tree = _tree(cast(Mapping[str, Any], data["tree"]))
+    else:
+        model = data.get("model")
+        if not isinstance(model, str) or not model:
+            raise InputError(f"{where}: model is {model!r}, expected the path of an MJCF or URDF file")
+        tree = read_tree(folder / model, _locked(data.get("locked"), where))
+    drives = data.get("drives") or {}
+    if not isinstance(drives, Mapping):
+        raise InputError(f"{where}: drives is {drives!r}, expected joints with their drives")
+    for joint in drives:
+        if joint not in tree.joints:
+            raise unknown_name("joint", str(joint), tree.joints, f"{where}: drives")
+    return robot_plant(tree, {str(joint): _drive(drives[joint], f"{where}: drives: {joint}") for joint in drives})
+
+
+def plant_to_mapping(plant: Plant) -> dict[str, object]:
+    """Tree and drives of a robot as a model.yaml holds them."""
+    assert plant.tree is not None
+    links = []
+    for link in plant.tree.links:
+        plain: dict[str, object] = {name: value for name, value in vars(link).items() if value is not None}
+        plain |= {name: getattr(link, name).tolist() for name in ARRAYS}
+        plain["limits"] = None if link.limits is None else list(link.limits)
+        links.append(plain)
+    drives = {joint: {k: v for k, v in vars(drive).items() if v is not None} for joint, drive in plant.drives.items()}
+    return {"tree": {"gravity": plant.tree.gravity.tolist(), "links": links}, "drives": drives}
+
+
+def _tree(data: Mapping[str, Any]) -> Tree:
+    links = []
+    for each in data["links"]:
+        known = {name: np.array(value, dtype=float) if name in ARRAYS else value for name, value in each.items()}
+        limits = known.get("limits")
+        links.append(Link(**{**known, "limits": None if limits is None else (float(limits[0]), float(limits[1]))}))
+    return Tree(tuple(links), np.array(data["gravity"], dtype=float))
+
+
+def _locked(data: object, where: str) -> dict[str, float]:
+    if data is None:
+        return {}
+    if not isinstance(data, Mapping):
+        raise InputError(f"{where}: locked is {data!r}, expected joints with their positions, e.g. {{finger: 0.0}}")
+    found = {str(joint): finite_number(position) for joint, position in data.items()}
+    for joint, position in found.items():
+        if position is None:
+            raise InputError(f"{where}: locked: {joint} is {data[joint]!r}, expected a position in rad or m")
+    return {joint: position for joint, position in found.items() if position is not None}
+
+
+def _drive(data: object, where: str) -> Drive:
+    if not isinstance(data, Mapping):
+        raise InputError(f"{where} is {data!r}, expected settings such as {{kind: torque, gain: 1.0}}")
+    kind = str(data.get("kind", "torque"))
+    if kind not in KINDS:
+        raise unknown_name("kind of drive", kind, KINDS, where)
+    valid = DRIVE_KEYS.get(kind, ("kind",)) if kind != "none" else ("kind",)
+    for key in data:
+        if key not in (*valid, *(("limit", "rate", "kp", "kd", "gain", "logged") if "tree" in where else ())):
+            raise unknown_name("setting", str(key), valid, where)
+    logged = str(data.get("logged", "command"))
+    if logged not in get_args(Logged):
+        raise unknown_name("value of logged", logged, get_args(Logged), where)
+    numbers: dict[str, float] = {}
+    for key in ("gain", "kp", "kd", "limit", "rate"):
+        if data.get(key) is not None:
+            number = finite_number(data[key])
+            if number is None or (key != "gain" and number < 0.0):
+                raise InputError(f"{where}: {key} is {data[key]!r}, expected a number of zero or more")
+            numbers[key] = number
+    if kind == "position" and numbers.get("kp", 0.0) <= 0.0:
+        raise InputError(f"{where}: kp is {data.get('kp')!r}, expected the stiffness of the position loop above 0")
+    return Drive(kind, logged=cast(Logged, logged), **numbers)  # pyright: ignore[reportArgumentType]
