@@ -50,7 +50,7 @@ class Link:
     effort: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tree:
     """An open kinematic tree on a fixed base.
 

@@ -66,13 +66,10 @@ def source(tree: Tree) -> str:
     return "\n\n\n".join([HEADER, _forces(tree), _solve(tree), _multiply(tree), FOOTER])
 
 
+@cache
 def rigid_body(tree: Tree) -> Any:
     """The compiled code of a robot (`wipx.sim.cache.part`); the first use of a robot takes seconds."""
-    return _loaded(source(tree))
-
-
-@cache
-def _loaded(text: str) -> Any:
+    text = source(tree)
     name = f"robot_{hashlib.sha256(text.encode()).hexdigest()[:16]}"
     path = compiled_folder() / f"{name}.py"
     if not path.is_file():
