@@ -28,7 +28,8 @@ from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import HORIZONS, ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.pipeline import in_two
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
@@ -152,16 +153,16 @@ def searched(context: Context, fitter: Fitter) -> tuple[str, ...]:
         nominal = fitter.first_fit(start)
     else:
         nominal = fitter.converged(fitter.fit(start, context.first_levels))
-    return Selection(fitter, context.setting, nominal).run().effects
+    return Search.of(FitStore.of(fitter, context.setting, nominal), nominal).run().fit.effects
 
 
 def refitted(context: Context, effects: tuple[str, ...]) -> Model:
     """The nominal model with effects, fitted to forecasts from where screening has the best of each in turn."""
     fitter = by_forecasts(ForecastFitter, context, context.setting)
     fit = fitter.first_fit(Hypothesis.of(context.setting, (), {}))
-    search = Selection(fitter, context.setting, fit)
+    store = FitStore.of(fitter, context.setting, fit)
     for effect in effects:
-        starts = [each for each in search.candidates_for(fit) if each.effect == effect]
+        starts = [each for each in store.candidates_for(fit) if each.effect == effect]
         values = {**fit.hypothesis.values, **(starts[0].values if starts else {})}
         begun = Hypothesis.of(context.setting, (*fit.effects, effect), values)
         fit = fitter.converged(fitter.fit(begun, fit.levels))

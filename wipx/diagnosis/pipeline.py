@@ -16,7 +16,8 @@ from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
 from wipx.sim.analytic import AnalyticSimulator
@@ -95,24 +96,25 @@ def diagnose(
     watcher("noise of the nominal model", 0.02)
     fitter = context.by_row
     nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
-    selection = Selection(fitter, setting, nominal, context.transfers)
+    store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)
-    first = selection.extensions(nominal)
+    first = store.extensions(nominal)
     if context.is_driven:
-        check_plausible(fitter, setting, selection.nominal, first[0] if first else nominal, source)
+        check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
-    chosen = selection.run()
+    search = Search.of(store, nominal, context.held_out)
+    chosen = search.run()
     watcher("what is left over", 0.5)
-    end = found(context, selection, chosen)
-    context, selection, rest = end.context, end.selection, end.rest
+    end = found(context, search, chosen)
+    context, search, rest = end.context, end.search, end.rest
     watcher("held-out recordings", 0.75)
-    answer = answered(context, selection, rest, end.shapes)
+    answer = answered(context, search, rest, end.shapes)
     watcher("next experiment", 0.9)
-    proposal = proposed(context, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    proposal = proposed(context, search, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
     answer = replace(answer, next_experiment=proposal)
     if suspected:
         watcher("suspects", 0.95)
-        answer = replace(answer, suspects=asked(context, selection, rest, answer, suspected))
+        answer = replace(answer, suspects=asked(context, search, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
     return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)

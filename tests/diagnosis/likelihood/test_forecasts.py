@@ -12,7 +12,8 @@ from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 
@@ -36,7 +37,7 @@ def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    found = Selection(fitter, case.setting, nominal).run()
+    found = Search.of(FitStore.of(fitter, case.setting, nominal), nominal).run().fit
     assert found.effects[0].startswith("translation/")
     level = next(v for name, v in found.hypothesis.values.items() if name.endswith((".F_c", ".F_s")))
     assert level == pytest.approx(1.0, rel=0.3)
@@ -46,7 +47,7 @@ def test_nothing_is_asked_for_where_the_nominal_model_is_right(fresh_seed: int):
     case = bench("linear_axis", {}, fresh_seed, count=3)
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    assert Selection(fitter, case.setting, nominal).run().effects == ()
+    assert Search.of(FitStore.of(fitter, case.setting, nominal), nominal).run().fit.effects == ()
 
 
 def test_a_mass_that_is_slightly_wrong_is_no_missing_law(fresh_seed: int):

@@ -8,13 +8,13 @@ from wipx.core.diagnosis import Combined
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.search import Search
 
 CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a constant force on a joint
 TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
 
-def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined, ...]:
+def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]:
     """Frictions that differ by direction which explain a Coulomb friction and a constant force of a fit as well."""
     found = []
     for friction in (effect for effect in fit.effects if effect.endswith("/coulomb")):
@@ -25,7 +25,7 @@ def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined
             start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
             hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
             other = context.fitter.converged(context.fitter.fit(hypothesis, context.fitter.escape_levels(fit)))
-            lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
+            lead = search.criteria.score_lead(other, fit)
             if lead > -TOLD_APART:
                 values = other.hypothesis.values
                 parameters = {symbol: values[f"{name}.{symbol}"] for symbol in ("F_plus", "F_minus")}

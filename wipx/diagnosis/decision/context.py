@@ -6,14 +6,13 @@ import numpy as np
 
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON, FitErrors
-from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.held_out import HeldOut
+from wipx.diagnosis.likelihood.hypothesis import Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.selection.search import Selection
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
@@ -26,7 +25,6 @@ QUIET = 5e-4
 # Ratio of errors beyond which a model is wrong: of those from states that trust it to those from the best states (of 24
 # exact robots one is at 1.51, the others below 1.4), and of its own to the nominal model's.
 DISTRUSTED = 1.5
-TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 
 
 @dataclass(frozen=True)
@@ -110,47 +108,10 @@ class Context:
         """Whether any command ever changes."""
         return bool(np.ptp(self.data.inputs.commands, axis=0).max() > 0.0)
 
-    def transfers(self, smaller: Fit, larger: Fit) -> bool:
-        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
-        return self.heldout_gain(transfer(self.fitter, larger), smaller) > -TOLERATED
-
-    def heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
-        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
-        before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings))
-        return 1.0 - self.heldout_error(repeated) / before if before > 0.0 else 0.0
-
-    def heldout_error(self, repeated: Transfer) -> float:
-        """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
-        folds = zip(repeated.models, self.recordings, strict=True)
-        return self._squared_error([self.judge.predict(model, (recording,))[0] for model, recording in folds])
-
-    def reduced(self, selection: Selection, fit: Fit, *gone: str) -> Fit:
-        """The fit without some of its effects, its stand-in kept."""
-        rest = tuple(e for e in fit.effects if e not in gone)
-        setting = self.setting_of(fit)
-        if setting is self.setting:
-            return selection.fitted(rest, fit) if rest else selection.nominal
-        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
-        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
-
-    def setting_of(self, fit: Fit) -> Setting:
-        """The robot, with the stand-in of a fit where it has one."""
-        model = fit.hypothesis.space.model
-        extra = {
-            name: values
-            for name, values in model.effects.items()
-            if name not in fit.effects and name not in self.setting.nominal.effects
-        }
-        if not extra:
-            return self.setting
-        return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
-
-    def _squared_error(self, predicted: list[np.ndarray]) -> float:
-        columns = self.data.plant.coordinates
-        return sum(
-            float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
-            for recording, coordinates in zip(self.recordings, predicted, strict=True)
-        )
+    @property
+    def held_out(self) -> HeldOut:
+        """Judges fits by recordings that they were not fitted to."""
+        return HeldOut(self.judge, self.recordings)
 
 
 def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:

@@ -22,7 +22,7 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
@@ -266,7 +266,7 @@ class _Case:
         if self.nominal is None:
             return -np.inf
         try:
-            extended = Selection(self.fitter, self.setting, self.nominal).extensions(self.nominal)
+            extended = FitStore.of(self.fitter, self.setting, self.nominal).extensions(self.nominal)
         except np.linalg.LinAlgError:
             extended = []
         return max(self._likelihood(fit) for fit in (self.nominal, *extended))

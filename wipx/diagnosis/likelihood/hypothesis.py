@@ -36,6 +36,12 @@ class Setting:
             return ParameterSpace(prepared, ())
         return parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
 
+    def with_curve_of(self, hypothesis: "Hypothesis") -> "Setting":
+        """The robot with the curve that stands in for what a hypothesis leaves over, where it has one."""
+        effects, known = hypothesis.space.model.effects, (*hypothesis.effects, *self.nominal.effects)
+        curve = {name: values for name, values in effects.items() if name not in known}
+        return replace(self, nominal=self.nominal.with_effects(curve)) if curve else self
+
     def doubted(self) -> "Setting":
         """The same robot, none of whose numbers is quite exact: those of a real machine never are."""
         body = {name: UNDECLARED for name, value in self.nominal.parameters.items() if value and name not in GIVEN}

@@ -10,6 +10,7 @@ from wipx.core.results import FitErrors, Trace
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.identify.evaluation import Judge
 
+TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 STEPS = 3  # of refining values that are nearly right
 FOLDS = 8  # at most; more recordings are left out in turn by several at once
 
@@ -25,6 +26,41 @@ class Transfer:
 
     models: tuple[Model, ...]
     likelihoods: np.ndarray
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Judges fits by predictions of recordings that they were not fitted to.
+
+    Attributes:
+        judge: Predicts recordings.
+        recordings: Of the robot.
+    """
+
+    judge: Judge
+    recordings: tuple[Recording, ...]
+
+    def transfers(self, fitter: Fitter, smaller: Fit, larger: Fit) -> bool:
+        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
+        return self.gain(transfer(fitter, larger), smaller) > -TOLERATED
+
+    def gain(self, repeated: Transfer, reduced: Fit) -> float:
+        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
+        before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings), repeated)
+        return 1.0 - self.error(repeated) / before if before > 0.0 else 0.0
+
+    def error(self, repeated: Transfer) -> float:
+        """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
+        folds = zip(repeated.models, self.recordings, strict=True)
+        predicted = [self.judge.predict(model, (recording,))[0] for model, recording in folds]
+        return self._squared_error(predicted, repeated)
+
+    def _squared_error(self, predicted: list[np.ndarray], repeated: Transfer) -> float:
+        columns = repeated.models[0].plant.coordinates
+        return sum(
+            float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
+            for recording, coordinates in zip(self.recordings, predicted, strict=True)
+        )
 
 
 def transfer(fitter: Fitter, fit: Fit) -> Transfer:

@@ -3,7 +3,7 @@
 import numpy as np
 from diagnosis.recorded import bench
 
-from wipx.diagnosis.decision.held_out import FOLDS, transfer
+from wipx.diagnosis.likelihood.held_out import FOLDS, transfer
 
 FRICTION = {"translation/coulomb": {"F_c": 0.4}}
 
