@@ -24,10 +24,11 @@ from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.decision.context import HORIZON, Context
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import HORIZONS, ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.pipeline import in_two
+from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import Judge
@@ -51,7 +52,7 @@ class NotHeldOut(ForecastFitter):
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance."""
-        return LEAST_GAIN
+        return self.rules.selection.least_gain
 
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Always."""
@@ -85,7 +86,7 @@ class Case:
         """The means of a diagnosis."""
         halves = in_two(self.seen)
         setting = Setting(self.nominal, self.uncertainty, scales_of(self.nominal, halves))
-        return Context.of(halves, setting, AnalyticSimulator(threads=1))
+        return Context.of(halves, setting, AnalyticSimulator(threads=1), USUAL)
 
     def error(self, model: Model) -> float:
         """Root mean square error over half a second on what was not seen, over the nominal model's."""
@@ -104,7 +105,7 @@ def by_forecasts(kind: type[ForecastFitter], context: Context, setting: Setting)
 
 def ahead(kind: type[ForecastFitter], *, doubted: bool) -> Callable[[Context], Fitter]:
     """A criterion of forecasts, with the owner's exact numbers in doubt or not."""
-    return lambda i: by_forecasts(kind, i, i.setting.doubted() if doubted else i.setting)
+    return lambda i: by_forecasts(kind, i, i.setting.doubted(i.rules.forecasts.undeclared) if doubted else i.setting)
 
 
 CRITERIA: Mapping[str, Callable[[Context], Fitter]] = {

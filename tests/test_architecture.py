@@ -22,7 +22,8 @@ LAYERS = (
     {"__main__"},
 )
 DIAGNOSIS = (
-    {"likelihood"},
+    {"rules"},
+    {"likelihood", "rules_page"},
     {"candidates", "residuals", "next_experiment"},
     {"selection"},
     {"decision"},

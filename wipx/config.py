@@ -45,6 +45,7 @@ class RunConfig:
         bounds: Search intervals [low, high] that replace the usual ones, by parameter [SI].
         model: The model to start from.
         task: What is done; like all the groups below a node with a `_target_`.
+        diagnosis: The rules of a diagnosis.
         recordings: Where recordings come from.
         plant: The nominal model.
         sim: The simulator.
@@ -67,6 +68,7 @@ class RunConfig:
     bounds: dict[str, Any] = field(default_factory=dict)
     model: ModelConfig = field(default_factory=ModelConfig)
     task: Any = None
+    diagnosis: Any = None
     recordings: Any = None
     plant: Any = None
     sim: Any = None
@@ -124,7 +126,11 @@ def build(node: object, group: str) -> Any:
     if not isinstance(node, Mapping) or "_target_" not in node:
         raise InputError(f"{group}: no option is chosen (the node has no _target_); choose one with {group}=OPTION")
     target = _target(node["_target_"], f"{group}._target_")
-    settings = {key: value for key, value in node.items() if key != "_target_"}
+    return _filled(target, {key: value for key, value in node.items() if key != "_target_"}, group)
+
+
+def _filled(target: type[Any], settings: Mapping[Any, Any], group: str) -> Any:
+    """A frozen dataclass with settings; `group` is its node's name, for messages."""
     declared = {item.name: item for item in fields(target) if item.init}
     for key in settings:
         if key not in declared:
@@ -170,7 +176,7 @@ def typed(value: object, kind: Any, where: str) -> Any:
     Args:
         value: Plain containers, strings, numbers, truth values or None.
         kind: The annotation: these types, unions of them, `Literal`, `list[...]`, `tuple[...]`,
-            `dict[str, ...]`, `Mapping[str, ...]` or `Any`.
+            `dict[str, ...]`, `Mapping[str, ...]`, a frozen dataclass of such fields or `Any`.
         where: Key, for messages.
 
     Raises:
@@ -179,6 +185,8 @@ def typed(value: object, kind: Any, where: str) -> Any:
     """
     if kind is Any or kind is object:
         return value
+    if is_dataclass(kind) and isinstance(kind, type) and isinstance(value, Mapping):
+        return _filled(kind, value, where)
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         return _member(value, kind, where)

@@ -16,6 +16,7 @@ from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.rules import USUAL, Rules
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search
 from wipx.identify.parameter_space import scales_of
@@ -69,6 +70,7 @@ def diagnose(
     rng: np.random.Generator | None = None,
     watcher: Watcher = unwatched,
     suspects: Mapping[str, Mapping[str, float]] | None = None,
+    rules: Rules = USUAL,
 ) -> Diagnosis:
     """Find out what physics a nominal model lacks.
 
@@ -82,6 +84,7 @@ def diagnose(
         watcher: Told the stage and the share that is done.
         suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
             suspected, by symbol [SI], or with none; they do not change the answer.
+        rules: What decides.
 
     Raises:
         InputError: a recording is too short, a suspect cannot be, or the recordings contradict the nominal model
@@ -92,7 +95,7 @@ def diagnose(
     halves = in_two(recordings)
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    context = Context.of(halves, setting, simulator)
+    context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)
     fitter = context.by_row
     nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))

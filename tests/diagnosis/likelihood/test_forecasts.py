@@ -8,7 +8,7 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
@@ -19,7 +19,9 @@ FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 
 
 def forecasts(case: Bench) -> ForecastFitter:
-    return ForecastFitter(case.fitter, case.quiet, case.quiet, case.setting.doubted())
+    return ForecastFitter(
+        case.fitter, case.quiet, case.quiet, case.setting.doubted(case.fitter.rules.forecasts.undeclared)
+    )
 
 
 def shaken(case: Bench, rng: np.random.Generator) -> Bench:
@@ -85,8 +87,8 @@ def test_two_laws_of_one_equation_are_not_told_apart_and_friction_is_from_a_spri
         fitter.first_fit(Hypothesis.of(case.setting, (effect,), {}))
         for effect in ("translation/coulomb", "translation/presliding", "environment/spring")
     )
-    assert _separation(fitter, friction, rich) < ALIKE
-    assert _separation(fitter, friction, spring) > ALIKE
+    assert _separation(fitter, friction, rich) < fitter.rules.answer.told_apart
+    assert _separation(fitter, friction, spring) > fitter.rules.answer.told_apart
 
 
 def _separation(fitter: ForecastFitter, fit: Fit, rival: Fit) -> float:

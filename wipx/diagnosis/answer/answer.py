@@ -22,12 +22,11 @@ from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
 from wipx.diagnosis.decision.confirmation import Rest
-from wipx.diagnosis.decision.context import FAR_FROM_THE_FLOOR, FAR_OFF, Context
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
-from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.held_out import Transfer, judged, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import inflation
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
 from wipx.diagnosis.residuals.discrepancy import curve_of
@@ -45,7 +44,7 @@ CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to 
 
 def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) -> Diagnosis:
     """Everything a person wants to know."""
-    nominal, fit = context.setting.nominal, rest.fit
+    nominal, fit, rules = context.setting.nominal, rest.fit, context.rules
     repeated = transfer(context.fitter, fit)
     judge = context.judge
     trusted = judge.tuned(nominal, context.recordings)
@@ -56,8 +55,8 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     ends = estimates(context.fitter, fit, search.nominal)
     effects = _effects(context, search, rest, repeated, ends, shapes)
     wrong = not context.is_quiet(fit) or context.is_worse(fit)
-    left = rest.significant or (fitted.times_the_floor > FAR_OFF and wrong)
-    matters = left and fitted.times_the_floor > FAR_FROM_THE_FLOOR
+    left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
+    matters = left and fitted.times_the_floor > rules.trust.near_floor
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(context, rest), significant=left)
     as_one = () if rest.significant else combined(context, search, fit)
@@ -79,7 +78,7 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
         unexplained=unexplained,
         candidates=tuple(_in_hindsight(candidate, fit) for candidate in rest.considered),
         bounds=bounds(search.store.candidates_for(fit), context.data.plant),
-        weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
+        weak=(*_weak(effects, rules.answer.wide), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
         traces=traces,
         notes=(),
@@ -100,7 +99,9 @@ def _remainder(
         {name: held_out.completed[name] / floor for name, floor in floors.items()},
         matters,
         horizon_errors(traces),
-        left_forces(context.by_row.simulator, context.data, context.judge.noise, model),
+        left_forces(
+            context.by_row.simulator, context.data, context.judge.noise, model, context.rules.residuals.telling
+        ),
     )
 
 
@@ -132,7 +133,7 @@ def _effects(
                 law.source,
                 law.outside_vocabulary,
                 tuple(e for e in ends if e.name.startswith(f"{effect}.")),
-                tuple(rival.name for rival in rivals if rival.separation < ALIKE),
+                tuple(rival.name for rival in rivals if rival.separation < context.rules.answer.told_apart),
                 rivals,
                 gains[effect],
                 context.held_out.gain(repeated, reduced[effect]),
@@ -160,7 +161,7 @@ def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tu
     base = search.store.reduced(fit, effect)
     for other in search.store.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
-        if name == effect or _is_richer(other, name, effect, context.data):
+        if name == effect or _is_richer(other, name, effect, context.fitter):
             continue
         starts = _starts(context, fit, other, effect, name)
         start = context.fitter.likeliest(starts, fit.levels, 1)[0]
@@ -191,10 +192,10 @@ def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> l
     return [Hypothesis.of(context.setting.with_curve_of(fit.hypothesis), rival.effects, each) for each in values]
 
 
-def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
+def _is_richer(other: Fit, name: str, effect: str, fitter: Fitter) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
     contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
-    replaced = reduced_effects(other, data)
+    replaced = reduced_effects(other, fitter.data, fitter.rules.nesting)
     return contained == effect or (replaced is not None and effect in replaced)
 
 
@@ -220,11 +221,11 @@ def _unexplained(context: Context, rest: Rest) -> Unexplained:
     return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
 
 
-def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
+def _weak(effects: tuple[FoundEffect, ...], wide: float) -> tuple[str, ...]:
     found = []
     for effect in effects:
         for p in effect.parameters:
-            if is_wide(p):
+            if is_wide(p, wide):
                 found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
         for name in effect.equivalent:
             found.append(f"{effect.name} cannot be told from {name}")
@@ -263,7 +264,9 @@ def proposed(
         for other in search.store.replacements(fit, effect)
         if name in other.effects and effect not in other.effects
     ]
-    weak = tuple(p.name for effect in answer.effects for p in effect.parameters if is_wide(p))
+    weak = tuple(
+        p.name for effect in answer.effects for p in effect.parameters if is_wide(p, context.rules.answer.wide)
+    )
     if not rivals and not weak:
         return None
     questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]

@@ -11,7 +11,6 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.search import Search
 
 CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a constant force on a joint
-TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
 
 def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]:
@@ -26,7 +25,7 @@ def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]
             hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
             other = context.fitter.converged(context.fitter.fit(hypothesis, context.fitter.escape_levels(fit)))
             lead = search.criteria.score_lead(other, fit)
-            if lead > -TOLD_APART:
+            if lead > -0.5 * context.rules.answer.told_apart**2:
                 values = other.hypothesis.values
                 parameters = {symbol: values[f"{name}.{symbol}"] for symbol in ("F_plus", "F_minus")}
                 found.append(Combined(name, (friction, constant), lead, parameters))

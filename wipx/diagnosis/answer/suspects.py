@@ -34,8 +34,6 @@ from wipx.effects.catalogue import check_together, effect_of, vocabulary
 from wipx.recordings.model_file import model_from_mapping
 from wipx.report.suspect_sentence import suspect_sentence
 
-CONFIDENCE = 0.95  # with which a size is excluded
-
 Suspected = Mapping[str, Mapping[str, float]]
 
 
@@ -131,7 +129,9 @@ class _Asked:
             size=None,
         )
         if values:
-            limit = 0.5 * chdtri(len(values), 1.0 - CONFIDENCE) * _overstated(free, numbers, self.name)
+            limit = (
+                0.5 * chdtri(len(values), 1.0 - context.rules.answer.confidence) * _overstated(free, numbers, self.name)
+            )
             suspect = replace(suspect, size=self.of_size(suspect, values, free, best, float(limit)))
         unexplained = self.answer.unexplained.significant
         return replace(suspect, sentence=suspect_sentence(suspect, unexplained=unexplained))

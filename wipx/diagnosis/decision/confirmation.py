@@ -8,11 +8,11 @@ from scipy.special import chdtrc
 
 from wipx.core.diagnosis import ConsideredEffect
 from wipx.diagnosis.candidates.screening import candidates_beside
-from wipx.diagnosis.decision.context import FAR_OFF, Context
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import deviations
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit
-from wipx.diagnosis.likelihood.held_out import TOLERATED, Transfer, transfer
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.discrepancy import with_curve
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests, shapes_of
@@ -21,20 +21,8 @@ from wipx.diagnosis.selection.nested_laws import extended_effects
 from wipx.diagnosis.selection.search import Chosen, History, Search
 from wipx.effects.catalogue import effect_of
 
-SIGNIFICANT = 1e-4  # p value, corrected, of a residual where nothing is named
-BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more of it is less of a surprise
-RESIDUAL_GAIN = 20.0  # nats that a residual must be worth
-SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has nine
-RESIDUAL_SHARE = 0.02  # and of what is explained
-BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
-DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
-CERTAIN = 3.0  # standard deviations by which a size must differ from nothing
-IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+BEYOND = 3  # laws from beyond the vocabulary that are fitted
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
-GIVEN_UP = 0.1  # of that effect's gain, that they may lack
-MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-SMALL_PRINT = 150.0  # nats; what gains more is no misfit of another law
-VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
 @dataclass(frozen=True)
@@ -74,7 +62,7 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
     shapes = shapes_of(context.by_row, kept.fit)
     rest = remaining(context, search, kept.fit, shapes).after(kept.considered)
     if rest.significant and len(kept.fit.effects) < len(chosen.fit.effects):
-        more = confirmed(context, search, chosen.fit, visible=-np.inf)
+        more = confirmed(context, search, chosen.fit, small=True)
         if set(more.fit.effects) > set(kept.fit.effects):
             whole = remaining(context, search, more.fit, shapes)
             if not whole.significant:
@@ -82,14 +70,14 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
     return rest.after(chosen.considered), shapes
 
 
-def confirmed(context: Context, search: Search, fit: Fit, visible: float = VISIBLE) -> Chosen:
+def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
     """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
 
     Args:
         context: The means.
         search: The search that chose the effects.
         fit: Of the effects.
-        visible: Share of the squared error of held-out predictions that a small effect must remove.
+        small: Whether small effects are kept that held-out predictions do not show.
     """
     if not fit.effects:
         return Chosen(fit)
@@ -99,18 +87,20 @@ def confirmed(context: Context, search: Search, fit: Fit, visible: float = VISIB
     gains = {effect: evidence(without[effect], fit) for effect in fit.effects}
     leading = max(gains, key=lambda effect: gains[effect])
     uncertain = _uncertain(context, search, fit)
+    rules = context.rules.confirmation
+    least = min(rules.minor * gains[leading], rules.most_misfit)
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
         change = predicted - np.concatenate(context.judge.predict(reduced.hypothesis.model, context.recordings))
         known = context.fitter.by_recording(reduced, reduced.white)
         # An effect that gains much and does not transfer points to something else that is missing.
-        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * context.judge.noise):
+        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < rules.irrelevant * context.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in uncertain and (gain < SMALL_PRINT or not nonsmooth_search.is_non_smooth(fit)):
+        elif effect in uncertain and (gain < rules.most_misfit or not nonsmooth_search.is_non_smooth(fit)):
             reason = "has a size that cannot be told from zero"
-        elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
+        elif gain < rules.doubtful and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and context.held_out.gain(repeated, reduced) < visible:
+        elif not small and gain < least and context.held_out.gain(repeated, reduced) < rules.visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
             rival = _rival_that_transfers(context, search, fit, effect, repeated, gain)
@@ -118,12 +108,12 @@ def confirmed(context: Context, search: Search, fit: Fit, visible: float = VISIB
                 continue
             reason = "held-out recordings contradict it, and not what is in its place"
             considered = (ConsideredEffect(effect, gain, False, reason),)
-            return confirmed(context, search, rival, visible).after(considered)
+            return confirmed(context, search, rival, small=small).after(considered)
         considered = (ConsideredEffect(effect, gain, False, reason),)
         plain = search.store.with_reduced_law(fit, effect)
         worth = plain is not None and search.criteria.gains_enough(reduced, plain)
         kept = plain if plain is not None and worth else reduced
-        return confirmed(context, search, kept, visible).after(considered)
+        return confirmed(context, search, kept, small=small).after(considered)
     return Chosen(fit)
 
 
@@ -135,7 +125,7 @@ def _uncertain(context: Context, search: Search, fit: Fit) -> list[str]:
     """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
-    known = size > CERTAIN * deviations(context.fitter, fit, search.nominal)
+    known = size > context.rules.confirmation.certain * deviations(context.fitter, fit, search.nominal)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
@@ -149,13 +139,14 @@ def _rival_that_transfers(
     context: Context, search: Search, fit: Fit, effect: str, repeated: Transfer, gain: float
 ) -> Fit | None:
     """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
-    if context.held_out.gain(repeated, search.store.without(fit, effect)) >= -TOLERATED:
+    rules = context.rules.confirmation
+    if context.held_out.gain(repeated, search.store.without(fit, effect)) >= -rules.tolerated:
         return None
     error = context.held_out.error(repeated)
     for other in search.store.replacements(fit, effect)[:RIVALS]:
-        if set(other.effects) != set(fit.effects) and evidence(other, fit) < GIVEN_UP * gain:
+        if set(other.effects) != set(fit.effects) and evidence(other, fit) < rules.given_up * gain:
             again = context.fitter.converged(context.fitter.fit(other.hypothesis, fit.levels))
-            if context.held_out.error(transfer(context.fitter, again)) < (1.0 - VISIBLE) * error:
+            if context.held_out.error(transfer(context.fitter, again)) < (1.0 - rules.visible) * error:
                 return again
     return None
 
@@ -193,7 +184,7 @@ def _left_over(context: Context, search: Search, fit: Fit, shapes: list[Shape], 
         named = _without_superfluous(search, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     for effect in fit.effects:
-        if evidence(search.store.reduced(stood_in, effect), stood_in) < LEAST_GAIN:
+        if evidence(search.store.reduced(stood_in, effect), stood_in) < context.rules.selection.least_gain:
             return remaining(context, search, search.store.without(fit, effect), shapes)
     return Rest(stood_in, widest, p_value, True, resembles, spread)
 
@@ -212,14 +203,17 @@ def significant_residuals(
     found = residual_tests(context.by_row, fit, shapes)
     p_value = min(1.0, min(residual.p_value for residual in found) * len(shapes))
     least = _least_gains(context, fit, explained)
-    return _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT), p_value
+    rules = context.rules.residuals
+    return _significant(found, p_value, least, rules.level_beside_effects if fit.effects else rules.level), p_value
 
 
 def _least_gains(context: Context, fit: Fit, explained: float) -> dict[str, float]:
     """What a residual of each kind must gain beside a fit that explains so much [nats]."""
-    share = (nonsmooth_search.SHARE if nonsmooth_search.is_non_smooth(fit) else RESIDUAL_SHARE) * explained
-    factor = BESIDE_MEANS if context.data.has_means else 1.0
-    curve, swing = factor * max(RESIDUAL_GAIN, share), factor * max(SWING_GAIN, share)
+    rules = context.rules.residuals
+    least_share = context.rules.selection.nonsmooth_share if nonsmooth_search.is_non_smooth(fit) else rules.least_share
+    share = least_share * explained
+    factor = rules.beside_means if context.data.has_means else 1.0
+    curve, swing = factor * max(rules.least_gain, share), factor * max(rules.least_swing, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
 
 
@@ -234,8 +228,9 @@ def _beyond(context: Context, fit: Fit, worth: float) -> tuple[tuple[str, ...], 
     """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
     ranked = candidates_beside(context.fitter, context.setting, fit, outside_vocabulary=True)
     best: dict[str, Fit] = {}
+    promising = context.rules.residuals.promising
     for candidate in ranked:
-        if candidate.gain < 0.3 * ranked[0].gain or candidate.gain < 0.3 * worth or len(best) == 3:
+        if candidate.gain < promising * ranked[0].gain or candidate.gain < promising * worth or len(best) == BEYOND:
             break
         if candidate.effect not in best:
             values = {**fit.hypothesis.values, **candidate.values}
@@ -275,7 +270,7 @@ def _other_law(context: Context, search: Search, fit: Fit, worth: float) -> tupl
 
 def _is_far_off(context: Context, fit: Fit) -> bool:
     """Whether predictions are much worse than sensor noise makes them."""
-    return context.errors(fit).times_the_floor > FAR_OFF
+    return context.errors(fit).times_the_floor > context.rules.trust.far_off
 
 
 def _without_superfluous(search: Search, fit: Fit) -> Fit:

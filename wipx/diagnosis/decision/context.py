@@ -13,18 +13,10 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.rules import Rules
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
-
-FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
-FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's predictions
-# Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In
-# half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
-QUIET = 5e-4
-# Ratio of errors beyond which a model is wrong: of those from states that trust it to those from the best states (of 24
-# exact robots one is at 1.51, the others below 1.4), and of its own to the nominal model's.
-DISTRUSTED = 1.5
 
 
 @dataclass(frozen=True)
@@ -48,14 +40,16 @@ class Context:
     recordings: tuple[Recording, ...]
 
     @classmethod
-    def of(cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator) -> "Context":
+    def of(
+        cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator, rules: Rules
+    ) -> "Context":
         """The means for recordings of a robot."""
         plant = setting.nominal.plant
         data = RecordingBatch.of(recordings, plant)
         noise = sensor_noise(recordings, plant)
         rates = [_rate_noise(recordings, plant.rates[c - data.joints]) for c in data.channels if c >= data.joints]
         levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
-        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal))
+        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
 
     def trusting(self, fit: Fit) -> "Context":
@@ -74,29 +68,36 @@ class Context:
         if not self.is_quiet(fit):
             return False
         errors = self.errors(fit)
-        if errors.times_the_floor <= FAR_FROM_THE_FLOOR:
+        if errors.times_the_floor <= self.rules.trust.near_floor:
             return True
         if self.is_worse(fit):
             return False
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
-        return all(others[name] <= DISTRUSTED * error for name, error in errors.completed.items())
+        return all(others[name] <= self.rules.trust.distrusted * error for name, error in errors.completed.items())
 
     def is_quiet(self, fit: Fit) -> bool:
         """Whether a fit asks for no forces but those of its laws, row by row."""
         levels = self.fitter.seen_by_row(fit)[1].levels
         usual = np.array([self.setting.scales[site].force for site in self.data.plant.joints])
-        return bool(np.all(levels.force <= QUIET * usual))
+        return bool(np.all(levels.force <= self.rules.trust.quiet * usual))
 
     def is_worse(self, fit: Fit) -> bool:
         """Whether a fit predicts the recordings far worse than the nominal model, though it was fitted to them."""
         errors = self.errors(fit)
-        return any(error > DISTRUSTED * errors.nominal[name] for name, error in errors.completed.items())
+        return any(
+            error > self.rules.trust.distrusted * errors.nominal[name] for name, error in errors.completed.items()
+        )
 
     def errors(self, fit: Fit) -> FitErrors:
         """Errors of the nominal model and of a fit on the recordings."""
         return self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
+
+    @property
+    def rules(self) -> Rules:
+        """What decides."""
+        return self.fitter.rules
 
     @property
     def data(self) -> RecordingBatch:

@@ -13,7 +13,7 @@ import numpy as np
 
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
-from wipx.diagnosis.likelihood.fitting import ALIKE, LEAST_GAIN, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
@@ -47,7 +47,8 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
         chosen: What it chose.
     """
     context = context.trusting(chosen.fit)
-    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, context.setting.doubted())
+    doubted = context.setting.doubted(context.rules.forecasts.undeclared)
+    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, doubted)
     rest, shapes = decided(context, search, chosen)
     by_row = Found(context, search, rest, shapes)
     if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
@@ -74,7 +75,7 @@ def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
     seen = fitter.seen_ahead(rest.fit)
     numbers = len(rest.fit.hypothesis.cube) + len(rest.spread) - len(other.hypothesis.cube)
     lead = seen.log_likelihood - other.log_likelihood - 0.5 * numbers * float(np.log(fitter.rows))
-    return fitter.separation(seen, other, lead, 1.0) > ALIKE
+    return fitter.separation(seen, other, lead, 1.0) > fitter.rules.answer.told_apart
 
 
 def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
@@ -82,7 +83,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
 
     A second search starts from what innovations chose; the better end counts.
     """
-    setting = context.setting
+    setting, least_gain = context.setting, context.rules.selection.least_gain
     ahead = replace(context, fitter=fitter)
     nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
     search = Search.of(FitStore.of(fitter, setting, nominal), nominal)
@@ -96,7 +97,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
         same = pruned.fit if criteria.gains_enough(nominal, pruned.fit) else nominal
     if set(same.effects) != set(best.fit.effects) and criteria.lead(same, best.fit) > 0.0:
         best = search.exchanged(same).after(best.considered)
-    hardly = set(same.effects) == set(best.fit.effects) or criteria.lead(best.fit, same) < LEAST_GAIN
+    hardly = set(same.effects) == set(best.fit.effects) or criteria.lead(best.fit, same) < least_gain
     agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
     ahead = ahead.trusting(best.fit)
     return Found(ahead, search, *_left_over(ahead, search.nominal, best)), agrees

@@ -10,7 +10,6 @@ from wipx.core.results import FitErrors, Trace
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.identify.evaluation import Judge
 
-TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 STEPS = 3  # of refining values that are nearly right
 FOLDS = 8  # at most; more recordings are left out in turn by several at once
 
@@ -42,7 +41,7 @@ class HeldOut:
 
     def transfers(self, fitter: Fitter, smaller: Fit, larger: Fit) -> bool:
         """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
-        return self.gain(transfer(fitter, larger), smaller) > -TOLERATED
+        return self.gain(transfer(fitter, larger), smaller) > -fitter.rules.confirmation.tolerated
 
     def gain(self, repeated: Transfer, reduced: Fit) -> float:
         """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""

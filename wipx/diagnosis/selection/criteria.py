@@ -11,9 +11,6 @@ import numpy as np
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.sandwich import inflation
 
-LEAST_SHARE = 0.01  # of what is explained already
-STICKING_SHARE = 0.05  # that bristles gain by how a joint comes to rest, where their bending is invisible
-
 
 def evidence(smaller: Fit, larger: Fit) -> float:
     """Log-likelihood that one fit has beyond another [nats].
@@ -68,4 +65,6 @@ class Criteria:
     def tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
         """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""
         rests = any(effect.endswith("/presliding") for effect in best.effects if effect not in simple)
-        return max(4.0, (STICKING_SHARE if rests else LEAST_SHARE) * evidence(self.nominal, best))
+        rules = self.fitter.rules.selection
+        share = rules.sticking_share if rests else rules.least_share
+        return max(rules.least_lead, share * evidence(self.nominal, best))

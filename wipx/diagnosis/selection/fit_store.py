@@ -132,7 +132,8 @@ class FitStore:
         for candidate in ranked:
             by_effect.setdefault(candidate.effect, []).append(candidate)
         best = max((ranked[0].gain if ranked else 0.0), 0.0)
-        least = max(self.fitter.promising * best, self.fitter.worthless)
+        rules = self.fitter.own_rules
+        least = max(rules.promising * best, rules.worthless)
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
         fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]

@@ -6,6 +6,7 @@ from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance
+from wipx.diagnosis.rules import NestingRules
 from wipx.effects.catalogue import effect_of, vocabulary
 from wipx.identify.noise import quantisation, sensor_noise
 
@@ -21,17 +22,12 @@ PARTS = {"translation/presliding": {"environment/spring.k": "stiffness", "transl
 CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer one from beyond it
 SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
 SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
-INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
-HARDLY = 0.1  # of a joint's travel, bent by which a bristle hardly slips
-BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
-CERTAIN_PEAK = 2.0  # standard deviations
-ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
 
 
-def reduced_effects(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
+def reduced_effects(fit: Fit, data: RecordingBatch, rules: NestingRules) -> tuple[str, ...] | None:
     """The effects of a fit with one law replaced by the simpler one that it amounts to; None where it does not."""
     for effect in fit.effects:
-        kind = _amounts_to(effect, fit, data)
+        kind = _amounts_to(effect, fit, data, rules)
         if kind is not None:
             other = f"{effect.partition('/')[0]}/{kind}"
             rest = tuple(other if e == effect else e for e in fit.effects)
@@ -49,22 +45,22 @@ def reduced_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | Non
     return None if excluded else simple
 
 
-def effects_in_parts(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
+def effects_in_parts(fit: Fit, data: RecordingBatch, rules: NestingRules) -> tuple[str, ...] | None:
     """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
     plant = fit.hypothesis.model.plant
     for effect in fit.effects:
         parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
         rest = tuple(e for e in fit.effects if e != effect and e not in parts)
-        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, data):
+        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, data, rules):
             return (*rest, *parts)
     return None
 
 
-def _hardly_slips(effect: str, fit: Fit, data: RecordingBatch) -> bool:
+def _hardly_slips(effect: str, fit: Fit, data: RecordingBatch, rules: NestingRules) -> bool:
     """Whether a bristle bends by a good part of what its joint travels before it slips."""
     value = fit.hypothesis.values
     travel = float(np.ptp(data.measured[:, data.plant.joints.index(effect.partition("/")[0])][data.rows]))
-    return value[f"{effect}.F_c"] > HARDLY * travel * value[f"{effect}.stiffness"]
+    return value[f"{effect}.F_c"] > rules.hardly_slips * travel * value[f"{effect}.stiffness"]
 
 
 def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
@@ -96,22 +92,22 @@ def reduced_values(fit: Fit) -> dict[str, float]:
     return found
 
 
-def _amounts_to(effect: str, fit: Fit, data: RecordingBatch) -> str | None:
+def _amounts_to(effect: str, fit: Fit, data: RecordingBatch, rules: NestingRules) -> str | None:
     site, _, kind = effect.partition("/")
     value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
     if kind == "presliding":
-        visible = INVISIBLE * _resolution(site, data)
+        visible = rules.invisible * _resolution(site, data)
         return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
     if kind == "stribeck":
-        return "coulomb" if not _peak_is_certain(effect, fit, data) else None
+        return "coulomb" if not _peak_is_certain(effect, fit, rules) else None
     if kind == "speed_limit":
-        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(data) else None
+        return "saturation" if value["v_free"] > rules.beyond_reach * _top_speed(data) else None
     if kind == "payload_event":
         return "payload" if value["t0"] <= float(data.inputs.t[0].max()) + 0.15 else None
     if kind == "sticky_spot":
         travel = data.measured[:, 0][data.rows]
         inside = np.mean((travel >= value["lo"]) & (travel <= value["hi"]))
-        return "coulomb" if inside > ALL_OVER else None
+        return "coulomb" if inside > rules.all_over else None
     return None
 
 
@@ -121,7 +117,7 @@ def _resolution(site: str, data: RecordingBatch) -> float:
     return max(quantisation(series), float(sensor_noise(data.recordings, data.plant)[joint]))
 
 
-def _peak_is_certain(effect: str, fit: Fit, data: RecordingBatch) -> bool:
+def _peak_is_certain(effect: str, fit: Fit, rules: NestingRules) -> bool:
     """Whether static and Coulomb level differ by more than chance."""
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     static, level = space.names.index(f"{effect}.F_s"), space.names.index(f"{effect}.F_c")
@@ -129,7 +125,7 @@ def _peak_is_certain(effect: str, fit: Fit, data: RecordingBatch) -> bool:
     slope = np.zeros(len(cube))
     slope[[static, level]] = size[static], -size[level]
     peak = float(slope @ cube)
-    return peak > CERTAIN_PEAK * float(np.sqrt(slope @ covariance(fit) @ slope))
+    return peak > rules.certain_peak * float(np.sqrt(slope @ covariance(fit) @ slope))
 
 
 def _top_speed(data: RecordingBatch) -> float:

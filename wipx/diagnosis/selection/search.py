@@ -8,18 +8,16 @@ and what it considered; fits are kept in a `FitStore`, and `Criteria` decide bet
 from dataclasses import dataclass
 
 from wipx.core.diagnosis import ConsideredEffect
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.held_out import HeldOut
+from wipx.diagnosis.rules import SelectionRules
 from wipx.diagnosis.selection.criteria import Criteria, evidence, score
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.nested_laws import effects_in_parts, reduced_effects
 
-MOST_EFFECTS = 8
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
-WORTH_PAIRING = 4.0  # nats that they must gain alone
 EXCHANGES = 3  # rounds at most
-LEAST_LEAD = 4.0  # nats by which a replacement must be better, and a rich law than the simple one that it contains
 
 History = tuple[ConsideredEffect, ...]
 
@@ -66,6 +64,11 @@ class Search:
         return cls(store, Criteria(store.fitter, base), first, held_out)
 
     @property
+    def rules(self) -> SelectionRules:
+        """What decides."""
+        return self.store.fitter.rules.selection
+
+    @property
     def nominal(self) -> Fit:
         """The fit of the nominal model."""
         return self.criteria.nominal
@@ -75,7 +78,7 @@ class Search:
         current, best = self.nominal, self.first
         considered: History = ()
         seen, fleeting = set[frozenset[str]](), set[frozenset[str]]()
-        while len(current.effects) < MOST_EFFECTS and frozenset(current.effects) not in seen:
+        while len(current.effects) < self.rules.most_effects and frozenset(current.effects) not in seen:
             seen.add(frozenset(current.effects))  # elimination may lead back to where the search has been
             extended = self.store.extensions(current)
             if current.effects:
@@ -95,7 +98,10 @@ class Search:
                 current, considered = pruned.fit, pruned.considered
                 continue
             pruned = self.pruned(self.store.restarted(best))
-            if len(pruned.fit.effects) == len(current.effects) and self._lead(pruned.fit, current) < LEAST_LEAD:
+            if (
+                len(pruned.fit.effects) == len(current.effects)
+                and self.criteria.lead(pruned.fit, current) < self.rules.least_lead
+            ):
                 reason = "hardly better in the place of one that is there"
                 considered += (ConsideredEffect(best.effects[-1], evidence(current, best), False, reason),)
                 break
@@ -109,18 +115,18 @@ class Search:
             return None
         fitter = self.store.fitter
         best = max(fits, key=lambda fit: score(fit, base))
-        replaced = reduced_effects(best, fitter.data)
+        replaced = reduced_effects(best, fitter.data, fitter.rules.nesting)
         while replaced is not None:
             found = self.store.fitted(replaced, best)
             if score(found, base) < score(best, base) - self.criteria.tolerance(best, replaced):
                 break
             best = found
-            replaced = reduced_effects(best, fitter.data)
+            replaced = reduced_effects(best, fitter.data, fitter.rules.nesting)
         for effect in best.effects:
             plain = self.store.with_reduced_law(best, effect)
-            if plain is not None and score(best, base) - score(plain, base) < fitter.richer_by:
+            if plain is not None and score(best, base) - score(plain, base) < fitter.own_rules.richer_by:
                 return plain
-        parts = effects_in_parts(best, fitter.data)
+        parts = effects_in_parts(best, fitter.data, fitter.rules.nesting)
         if parts is not None:
             found = self.store.restarted(self.store.fitted(parts, best))
             best = found if score(found, base) > score(best, base) else best
@@ -142,12 +148,13 @@ class Search:
         """Every effect replaced by a better one, or by itself at better values, as long as there is any."""
         considered: History = ()
         for _ in range(EXCHANGES):
-            best, most = fit, LEAST_LEAD
+            best, most = fit, self.rules.least_lead
             for effect in fit.effects:
                 base = self.store.without(fit, effect)
                 found = self.preferred(self.store.extensions(base), base)
-                if found is not None and self._lead(found, fit) > most and self.criteria.gains_enough(base, found):
-                    best, most = found, self._lead(found, fit)
+                lead = most if found is None else self.criteria.lead(found, fit)
+                if found is not None and lead > most and self.criteria.gains_enough(base, found):
+                    best, most = found, lead
             if best is fit:
                 fewer = self._with_fewer(fit)
                 best, considered = fewer.fit, considered + fewer.considered
@@ -175,16 +182,16 @@ class Search:
     def _transfers(self, smaller: Fit, larger: Fit) -> bool:
         """Whether a fit has few effects, or predicts held-out recordings about as well as a smaller one."""
         fitter = self.store.fitter
-        if self.held_out is None or len(larger.effects) <= fitter.unproven:
+        if self.held_out is None or len(larger.effects) <= fitter.own_rules.unproven:
             return True
         return self.held_out.transfers(fitter, smaller, larger)
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
-        if len(current.effects) + 2 > self.store.fitter.unproven:
+        if len(current.effects) + 2 > self.store.fitter.own_rules.unproven:
             return None
         for one in extended[:PAIRED]:
-            if one.log_likelihood - current.log_likelihood >= WORTH_PAIRING:
+            if one.log_likelihood - current.log_likelihood >= self.rules.worth_pairing:
                 two = self.preferred(self.store.extensions(one), current)
                 if two is not None and self.criteria.gains_enough(current, two):
                     return two
@@ -194,16 +201,16 @@ class Search:
         """A fit in which one effect does the work of two that is hardly worse; the fit itself where there is none."""
         for effect in fit.effects if len(fit.effects) > 1 else ():
             for found in self.store.replacements(fit, effect):
-                if set(found.effects) == set(fit.effects) or self.criteria.score_lead(fit, found) > LEAST_LEAD:
+                if (
+                    set(found.effects) == set(fit.effects)
+                    or self.criteria.score_lead(fit, found) > self.rules.least_lead
+                ):
                     continue
                 fewer = self.pruned(found)
                 less = len(fewer.fit.effects) < len(fit.effects)
-                if less and self.criteria.score_lead(fit, fewer.fit) < LEAST_GAIN:
+                if less and self.criteria.score_lead(fit, fewer.fit) < self.rules.least_gain:
                     return fewer
         return Chosen(fit)
-
-    def _lead(self, fit: Fit, other: Fit) -> float:
-        return self.criteria.lead(fit, other)
 
 
 def _step(current: Fit, extended: list[Fit], chosen: Fit | None, fleeting: set[frozenset[str]]) -> History:
