@@ -120,4 +120,4 @@ def diagnose(
         answer = replace(answer, suspects=asked(context, search, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
-    return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)
+    return replace(answer, title=title, source=source, notes=caveats(recordings, rules.answer), seconds=seconds)

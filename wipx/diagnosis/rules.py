@@ -320,6 +320,22 @@ class AnswerRules:
     wide: float = rule(0.3, "relative half width", "interval of a weak number, at least", JUDGEMENT, UNLIMITED)
     concentrated: float = rule(0.6, "of the mismatch", "share of an interval that is told", JUDGEMENT, 0.0)
     few_rows: float = rule(0.3, "of the rows", "rows of that interval, at most", JUDGEMENT, 1.0)
+    gap: float = rule(
+        1.5, "usual time steps", "time step beyond which rows are missing", "derived: halfway to one row", UNLIMITED
+    )
+    uneven: float = rule(
+        0.05, "of the usual time step", "variation of time steps from which the answer says so", JUDGEMENT, UNLIMITED
+    )
+
+
+@dataclass(frozen=True)
+class ExperimentRules:
+    """Which next experiment is worth proposing."""
+
+    useless: float = rule(
+        1.0, "standard deviations", "separation below which an experiment settles nothing", JUDGEMENT, 0.0
+    )
+    most_repeats: int = rule(20, "runs", "repeats of an experiment that are proposed, at most", JUDGEMENT, 1000)
 
 
 @dataclass(frozen=True)
@@ -363,6 +379,7 @@ class Rules:
         residuals: When something is left over.
         trust: Whether laws hold, or only nearly.
         answer: What is said of numbers, rivals and places.
+        experiment: Which next experiment is worth proposing.
         plausibility: When a description of a robot is refused.
     """
 
@@ -374,6 +391,7 @@ class Rules:
     residuals: ResidualRules = ResidualRules()
     trust: TrustRules = TrustRules()
     answer: AnswerRules = AnswerRules()
+    experiment: ExperimentRules = ExperimentRules()
     plausibility: PlausibilityRules = PlausibilityRules()
 
     def each(self) -> Iterator[tuple[str, float, Note]]:

@@ -275,4 +275,6 @@ def proposed(
     closed, rate = feedback if feedback is not None else (None, context.recordings[0].rate)
     simulator = context.by_row.simulator
     answered_by_row = context.fitter.seen_by_row(fit)[1]
-    return next_experiment(question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng)
+    return next_experiment(
+        question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng, context.rules
+    )

@@ -13,13 +13,13 @@ import numpy as np
 from wipx.core.diagnosis import HorizonErrors, LeftForce
 from wipx.core.model import Model
 from wipx.core.plant import Plant
-from wipx.core.results import Trace
+from wipx.core.results import HORIZON, Trace
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import linearise_along
 from wipx.identify.smoothing import Smoother
 from wipx.sim.analytic import AnalyticSimulator
 
-HORIZONS = (0.1, 0.2, 0.5)  # [s] after a start
+HORIZONS = (0.1, 0.2, HORIZON)  # [s] after a start
 WITHIN = 0.05  # [s] up to a horizon, whose rows count
 BANDWIDTH = 30.0  # [rad/s] of the filter; forces that change faster than in 30 ms do not show
 STRETCH = 1.0  # [s] of the stretches that are fitted and judged in turn
