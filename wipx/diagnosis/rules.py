@@ -215,7 +215,7 @@ class ConfirmationRules:
         0.1,
         "of an effect's gain",
         "what a rival may lack that takes the place of an effect which held-out recordings contradict",
-        REAL,
+        DEVELOPING,
         0.0,
     )
 
@@ -264,7 +264,7 @@ class ResidualRules:
 class TrustRules:
     """Whether laws hold, or only nearly."""
 
-    far_off: float = rule(5.0, "noise floors", "errors of predictions that are far off", REAL, UNLIMITED)
+    far_off: float = rule(5.0, "noise floors", "errors of predictions that are far off", DEVELOPING, UNLIMITED)
     near_floor: float = rule(
         2.5, "noise floors", "errors of a right model's predictions, at most", DEVELOPING, UNLIMITED
     )
@@ -304,7 +304,7 @@ class AnswerRules:
         5e-4,
         "of the evidence",
         "what a right law may miss; widens intervals",
-        f"{DEVELOPING}: intervals cover as often as they say",
+        f"{DEVELOPING}: laws are approximations",
         0.0,
     )
     moves: float = rule(
