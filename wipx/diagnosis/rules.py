@@ -1,7 +1,8 @@
 """The rules of a diagnosis: every number that decides an answer, with its unit, its meaning and where it comes from.
 
 `conf/diagnosis/default.yaml` holds the same values, so that a sweep over a rule is an ordinary experiment, and
-`docs/rules.md` is the table of them. Numerics (steps, grids, how many starts are tried) stay where they are used.
+`docs/rules.md` is the table of them. Numerics (steps, grids, how many starts are tried) stay where they are used, and
+the sizes at which a law amounts to a simpler one stand with the law (`wipx.effects`).
 """
 
 from collections.abc import Iterator
@@ -140,33 +141,6 @@ class SelectionRules:
     )
     worth_pairing: float = rule(
         4.0, "nats", "gain of an effect, not enough alone, for which a second one is sought", DEVELOPING, UNLIMITED
-    )
-
-
-@dataclass(frozen=True)
-class NestingRules:
-    """When a rich law amounts to the simple one that it contains."""
-
-    invisible: float = rule(
-        0.3, "sensor resolutions", "deflection of bristles that cannot be seen: Coulomb friction", DEVELOPING, 0.0
-    )
-    hardly_slips: float = rule(
-        0.1,
-        "of the travel",
-        "deflection at which bristles hardly slip: they are a spring and a damper",
-        DEVELOPING,
-        UNLIMITED,
-    )
-    beyond_reach: float = rule(3.0, "top speeds", "speed limit that is never felt: a saturation", DEVELOPING, UNLIMITED)
-    certain_peak: float = rule(
-        2.0,
-        "standard deviations",
-        "difference of static and Coulomb friction below which there is none",
-        "5 % level",
-        0.0,
-    )
-    all_over: float = rule(
-        0.9, "of the rows", "share of a sticky spot from which it is plain Coulomb friction", DEVELOPING, 1.0
     )
 
 
@@ -374,7 +348,6 @@ class Rules:
         selection: What an effect must gain.
         innovations: Which effects innovations let in.
         forecasts: Which effects forecasts let in.
-        nesting: When a rich law amounts to a simple one.
         confirmation: Which chosen effects are kept.
         residuals: When something is left over.
         trust: Whether laws hold, or only nearly.
@@ -386,7 +359,6 @@ class Rules:
     selection: SelectionRules = SelectionRules()
     innovations: InnovationRules = InnovationRules()
     forecasts: ForecastRules = ForecastRules()
-    nesting: NestingRules = NestingRules()
     confirmation: ConfirmationRules = ConfirmationRules()
     residuals: ResidualRules = ResidualRules()
     trust: TrustRules = TrustRules()

@@ -12,7 +12,9 @@ single rule is changed like any other setting:
     python -m wipx task=diagnose recordings.path=FOLDER diagnosis.selection.least_share=0.02
 
 *Neutral* is the value with which a rule decides nothing; `+experiment=ablation_rules` leaves out one rule at a time and
-counts what each is worth. This page is generated: `python -m wipx.diagnosis.rules_page > docs/rules.md`.
+counts what each is worth. The sizes at which a law amounts to a simpler one stand with the law, in `wipx/effects`.
+
+This page is generated: `python -m wipx.diagnosis.rules_page > docs/rules.md`.
 """
 COLUMNS = "| rule | value | unit | meaning | origin | neutral |\n| --- | ---: | --- | --- | --- | ---: |"
 

@@ -17,25 +17,26 @@ from wipx.core.diagnosis import (
 )
 from wipx.core.model import Model
 from wipx.core.results import Estimate, FitErrors, Trace
-from wipx.core.words import effect_in_words
 from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
 from wipx.diagnosis.decision.confirmation import Rest
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
-from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.held_out import Transfer, judged, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import inflation
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
 from wipx.diagnosis.residuals.discrepancy import curve_of
 from wipx.diagnosis.residuals.remaining_forces import horizon_errors, left_forces
 from wipx.diagnosis.residuals.residual_tests import Shape
 from wipx.diagnosis.selection.criteria import evidence, score
-from wipx.diagnosis.selection.nested_laws import CONTAINS, reduced_effects
+from wipx.diagnosis.selection.nested_laws import reduced_effects, simple_law
 from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import effect_of
+from wipx.effects.words import effect_in_words
 from wipx.report.diagnosis_sentence import sentence
 from wipx.sim.simulator import StateFeedback
 
@@ -161,7 +162,7 @@ def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tu
     base = search.store.reduced(fit, effect)
     for other in search.store.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
-        if name == effect or _is_richer(other, name, effect, context.fitter):
+        if name == effect or _is_richer(other, name, effect, context.data):
             continue
         starts = _starts(context, fit, other, effect, name)
         start = context.fitter.likeliest(starts, fit.levels, 1)[0]
@@ -192,11 +193,10 @@ def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> l
     return [Hypothesis.of(context.setting.with_curve_of(fit.hypothesis), rival.effects, each) for each in values]
 
 
-def _is_richer(other: Fit, name: str, effect: str, fitter: Fitter) -> bool:
+def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
-    contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
-    replaced = reduced_effects(other, fitter.data, fitter.rules.nesting)
-    return contained == effect or (replaced is not None and effect in replaced)
+    replaced = reduced_effects(other, data)
+    return simple_law(name) == effect or (replaced is not None and effect in replaced)
 
 
 def _unexplained(context: Context, rest: Rest) -> Unexplained:

@@ -10,6 +10,7 @@ import numpy as np
 
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.sandwich import inflation
+from wipx.diagnosis.selection.nested_laws import comes_to_rest
 
 
 def evidence(smaller: Fit, larger: Fit) -> float:
@@ -64,7 +65,7 @@ class Criteria:
 
     def tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
         """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""
-        rests = any(effect.endswith("/presliding") for effect in best.effects if effect not in simple)
+        rests = any(comes_to_rest(effect) for effect in best.effects if effect not in simple)
         rules = self.fitter.rules.selection
         share = rules.sticking_share if rests else rules.least_share
         return max(rules.least_lead, share * evidence(self.nominal, best))

@@ -5,12 +5,13 @@ What is preferred is decided elsewhere (`criteria`, `search`).
 
 from dataclasses import dataclass, field
 
-from wipx.diagnosis.candidates.screening import SCANS, Candidate, candidates_beside, candidates_of_effect, unscaled
+from wipx.diagnosis.candidates.screening import Candidate, candidates_beside, candidates_of_effect, unscaled
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_law, reduced_values
+from wipx.effects.catalogue import kind_of
 
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
@@ -114,9 +115,7 @@ class FitStore:
         if moved is not fit:
             found.append(self.fitter.converged(moved))
         if len(fit.effects) > 1:
-            found += [
-                self._restarted_without(fit, effect) for effect in fit.effects if effect.partition("/")[2] in SCANS
-            ]
+            found += [self._restarted_without(fit, effect) for effect in fit.effects if kind_of(effect).scan]
         again = max(found, key=lambda each: each.log_likelihood)
         return fit if again.log_likelihood < fit.log_likelihood + 1.0 else self.keep(again)
 
@@ -161,6 +160,6 @@ class FitStore:
             count = nonsmooth_search.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)
         fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
-        if starts[0].effect.partition("/")[2] in nonsmooth_search.NON_SMOOTH:
+        if kind_of(starts[0].effect).non_smooth:
             fits = [nonsmooth_search.searched_by_trial(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)

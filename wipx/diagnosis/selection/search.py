@@ -115,18 +115,18 @@ class Search:
             return None
         fitter = self.store.fitter
         best = max(fits, key=lambda fit: score(fit, base))
-        replaced = reduced_effects(best, fitter.data, fitter.rules.nesting)
+        replaced = reduced_effects(best, fitter.data)
         while replaced is not None:
             found = self.store.fitted(replaced, best)
             if score(found, base) < score(best, base) - self.criteria.tolerance(best, replaced):
                 break
             best = found
-            replaced = reduced_effects(best, fitter.data, fitter.rules.nesting)
+            replaced = reduced_effects(best, fitter.data)
         for effect in best.effects:
             plain = self.store.with_reduced_law(best, effect)
             if plain is not None and score(best, base) - score(plain, base) < fitter.own_rules.richer_by:
                 return plain
-        parts = effects_in_parts(best, fitter.data, fitter.rules.nesting)
+        parts = effects_in_parts(best, fitter.data)
         if parts is not None:
             found = self.store.restarted(self.store.fitted(parts, best))
             best = found if score(found, base) > score(best, base) else best
