@@ -1,15 +1,18 @@
 """Rules stand once: the dataclasses, the configuration and the page of them agree."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
+from diagnosis.recorded import SIMULATOR, bench
 from hydra import compose, initialize_config_dir
 from omegaconf import OmegaConf
 
 from wipx.app import configuration_folder
 from wipx.config import build, register
 from wipx.core.errors import InputError
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.rules import USUAL, Note
 from wipx.diagnosis.rules_page import page
 
@@ -37,6 +40,16 @@ def test_an_unknown_rule_is_refused():
     node = {"_target_": "wipx.diagnosis.rules.Rules", "selection": {"least_shar": 0.02}}
     with pytest.raises(InputError, match=r"diagnosis\.selection.*least_share"):
         build(node, "diagnosis")
+
+
+def test_a_diagnosis_keeps_to_the_rules_that_it_is_given(fresh_seed: int):
+    case = bench("linear_axis", {"translation/coulomb": {"F_c": 1.0}}, fresh_seed)
+    robot = KnownRobot(case.nominal, case.uncertainty)
+    demanding = replace(USUAL, selection=replace(USUAL.selection, least_gain=1e6))
+    assert [effect.name for effect in case.diagnosed().effects] == ["translation/coulomb"]
+    answer = diagnose(case.recordings, robot, SIMULATOR, rules=demanding)
+    assert "translation/coulomb" not in {effect.name for effect in answer.effects}
+    assert answer.verdict == "unexplained"
 
 
 def test_the_page_is_up_to_date():
