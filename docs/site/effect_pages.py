@@ -1,9 +1,11 @@
 """One page for each effect, from what its module says."""
 
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 from inspect import getdoc
 
+from docstrings import attributes
 from markdown_table import table
 
 from wipx.core.effect import Effect
@@ -36,9 +38,9 @@ def _page(effect: Effect) -> str:
         "## Sites",
         ", ".join(f"`{site}/{effect.kind}`" for site in effect.sites),
     ]
-    others = [(f"`{name}`", text) for name, text in _other_fields(effect)]
+    others = _other_fields(effect)
     if others:
-        parts += ["## Further fields", table(("field", "value"), others), "`wipx.core.effect.Effect` explains them."]
+        parts += ["## What else is known of it", table(("field", "value", "meaning"), others)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -49,14 +51,22 @@ def _parameter(parameter: Parameter) -> tuple[str, ...]:
     return f"`{parameter.name}`", parameter.meaning, unit, *ends
 
 
-def _other_fields(effect: Effect) -> list[tuple[str, str]]:
-    """Fields that say something and can be written down."""
-    found = []
-    for item in fields(effect):
-        value = getattr(effect, item.name)
-        if item.name not in SHOWN and value not in (None, (), "", False, 0.0) and not callable(value):
-            found.append((item.name, ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)))
-    return found
+def _other_fields(effect: Effect) -> list[tuple[str, str, str]]:
+    """Name, value and meaning of the fields that say something and can be written down."""
+    meaning = attributes(Effect)
+    values = [(item.name, _plain(getattr(effect, item.name))) for item in fields(effect) if item.name not in SHOWN]
+    return [(f"`{name}`", value, meaning.get(name, "")) for name, value in values if value]
+
+
+def _plain(value: object) -> str:
+    """A value in a cell; empty where it says nothing or is code."""
+    if isinstance(value, tuple):
+        return ", ".join(filter(None, map(_plain, value)))
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name}: {_plain(item)}" if _plain(item) else str(name) for name, item in value.items())
+    if is_dataclass(value):
+        return "; ".join(filter(None, (_plain(getattr(value, item.name)) for item in fields(value))))
+    return str(value) if isinstance(value, str | bool | int | float) and value else ""
 
 
 def _index() -> str:

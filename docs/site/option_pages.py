@@ -4,11 +4,11 @@ import re
 from dataclasses import MISSING, fields
 from functools import cache
 from importlib import import_module
-from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
 import yaml
+from docstrings import attributes
 from markdown_table import table
 
 from wipx.config import RunConfig
@@ -29,7 +29,7 @@ def option_pages() -> dict[str, str]:
 
 
 def _index(folders: list[Path]) -> str:
-    meaning = _attributes(RunConfig)
+    meaning = attributes(RunConfig)
     rows = [
         (f"[`{folder.name}`]({folder.name}.md)", ", ".join(map("`{}`".format, _names(folder))), _meaning(folder))
         for folder in folders
@@ -58,7 +58,7 @@ def _group(folder: Path) -> str:
 
 
 def _meaning(folder: Path) -> str:
-    return _attributes(RunConfig).get(folder.name) or _NOT_A_PART.get(folder.name, "")
+    return attributes(RunConfig).get(folder.name) or _NOT_A_PART.get(folder.name, "")
 
 
 _NOT_A_PART = {
@@ -90,7 +90,7 @@ def _option(folder: Path, name: str) -> str:
 def _settings(target: str, content: dict[str, Any], comments: dict[str, str]) -> list[tuple[str, ...]]:
     """One row for each field of the dataclass, with the file's value or else the field's own."""
     built = _class_of(target)
-    meaning = _attributes(built)
+    meaning = attributes(built)
     rows = []
     for item in fields(built):
         if item.init:
@@ -119,24 +119,6 @@ def _short(value: object) -> str:
 def _class_of(target: str) -> type:
     module, _, name = target.rpartition(".")
     return getattr(import_module(module), name)
-
-
-@cache
-def _attributes(built: type) -> dict[str, str]:
-    """What the docstrings of a class and of those that it inherits from say of its attributes."""
-    said: dict[str, str] = {}
-    for one in reversed(built.__mro__):
-        section = (getdoc(one) or "").partition("Attributes:\n")[2] if "__doc__" in vars(one) else ""
-        name = None
-        for line in section.splitlines():
-            start = re.match(r"^ {4}(\w+): (.*)$", line)
-            if start:
-                name, said[start[1]] = start[1], start[2]
-            elif name and line.startswith(" " * 8):
-                said[name] += " " + line.strip()
-            elif line and not line.startswith(" "):
-                break
-    return said
 
 
 def _opening_comment(text: str) -> str:
