@@ -55,7 +55,7 @@ def _other_fields(effect: Effect) -> list[tuple[str, str, str]]:
     """Name, value and meaning of the fields that say something and can be written down."""
     meaning = attributes(Effect)
     values = [(item.name, _plain(getattr(effect, item.name))) for item in fields(effect) if item.name not in SHOWN]
-    return [(f"`{name}`", value, meaning.get(name, "")) for name, value in values if value]
+    return [(f"`{name}`", f"`{value}`", meaning.get(name, "")) for name, value in values if value]
 
 
 def _plain(value: object) -> str:

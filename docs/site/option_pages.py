@@ -1,7 +1,7 @@
 """One page for each group of options, from its files in conf/ and the dataclasses that they build."""
 
 import re
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -78,7 +78,7 @@ def _option(folder: Path, name: str) -> str:
         parts.append(f"```yaml\n{_body(text)}\n```")
         return "\n\n".join(part for part in parts if part)
     parts.append(f"Builds `{target}`.")
-    rows = _settings(target, content, _inline_comments(text))
+    rows = _settings(_class_of(target), content, _inline_comments(text))
     head = ("key", "value", "type", "meaning", "comment in the file")
     parts.append(table(head, rows) if rows else "It has no settings.")
     if "defaults" in content:
@@ -87,18 +87,23 @@ def _option(folder: Path, name: str) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def _settings(target: str, content: dict[str, Any], comments: dict[str, str]) -> list[tuple[str, ...]]:
+def _settings(
+    built: type, content: dict[str, Any], comments: dict[str, str], prefix: str = ""
+) -> list[tuple[str, ...]]:
     """One row for each field of the dataclass, with the file's value or else the field's own."""
-    built = _class_of(target)
     meaning = attributes(built)
     rows = []
     for item in fields(built):
         if item.init:
             default = item.default_factory() if item.default_factory is not MISSING else item.default
             value = content.get(item.name, default)
+            name = f"{prefix}{item.name}"
+            if is_dataclass(item.type) and isinstance(value, dict):
+                rows += _settings(item.type, value, {}, f"{name}.")
+                continue
             shown = "" if value is MISSING else _short(value)
             said = meaning.get(item.name, ""), comments.get(item.name, "")
-            rows.append((f"`{item.name}`", shown, f"`{_kind(item.type)}`", *said))
+            rows.append((f"`{name}`", shown, f"`{_kind(item.type)}`", *said))
     return rows
 
 

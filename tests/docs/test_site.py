@@ -37,7 +37,7 @@ def test_every_option_and_each_of_its_keys_is_on_a_page(path: Path):
     section = page.partition(f"## {group}={'/'.join(rest)}\n")[2].partition("\n## ")[0]
     assert section
     keys = set(yaml.safe_load(path.read_text()) or {}) - {"_target_", "defaults"}
-    assert all(f"`{key}`" in section or f"\n{key}:" in section for key in keys)
+    assert all(f"`{key}`" in section or f"`{key}." in section or f"\n{key}:" in section for key in keys)
 
 
 @pytest.mark.parametrize("kind", kinds())
