@@ -4,7 +4,9 @@ import pytest
 
 from wipx.core.effect import Effect
 from wipx.core.errors import InputError
+from wipx.core.parameters import Parameter
 from wipx.core.plant import PLANTS, plant_of
+from wipx.diagnosis.candidates.screening import SCANS
 from wipx.effects.catalogue import check_together, effect_of, kinds, vocabulary
 
 # Contract section 3: kind, sites on a wip, parameters that the contract names.
@@ -46,6 +48,7 @@ def test_the_vocabulary_of_the_contract_is_there(kind: str, sites: tuple[str, ..
 def test_every_effect_says_what_it_is(kind: str):
     effect = kinds()[kind]
     assert effect.kind == kind
+    assert effect.words
     assert effect.law
     assert effect.source
     assert effect.sites
@@ -58,6 +61,33 @@ def test_every_effect_says_what_it_is(kind: str):
         assert p.meaning
         assert p.low < p.high
         assert p.low <= p.start <= p.high
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_what_an_effect_says_of_others_and_of_its_numbers_exists(kind: str):
+    effect = kinds()[kind]
+    relations = (effect.contains, effect.extends, effect.with_constant)
+    assert {relation.kind for relation in relations if relation} <= set(ALL)
+    if effect.contains:
+        assert set(effect.contains.symbols) <= effect.neutral.keys()
+        assert set(effect.contains.symbols.values()) <= kinds()[effect.contains.kind].neutral.keys()
+    if effect.extends:
+        assert kinds()[effect.extends.kind].neutral.keys() <= effect.neutral.keys()
+    if effect.made_of:
+        known = {f"{site}/{other}.{p.name}" for other in ALL for site in kinds()[other].sites for p in params(other)}
+        assert set(effect.made_of.numbers) <= known
+        assert set(effect.made_of.numbers.values()) <= effect.neutral.keys()
+    if effect.non_smooth:
+        assert effect.non_smooth.ridge.keys() | effect.non_smooth.imitates.keys() <= effect.neutral.keys()
+        assert set(effect.non_smooth.imitates.values()) <= set(ALL)
+    assert {*effect.linear_in, *(effect.stretch or ()), *filter(None, (effect.begins,))} <= effect.neutral.keys()
+    assert not effect.linear_at_rest or effect.linear_at_rest in ALL
+    assert not effect.scan or effect.scan in SCANS
+    assert {name.partition("/")[2] for name in effect.indistinguishable} <= set(ALL)
+
+
+def params(kind: str) -> tuple[Parameter, ...]:
+    return kinds()[kind].parameters
 
 
 def test_every_kind_is_defined_once():

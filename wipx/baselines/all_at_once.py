@@ -10,15 +10,14 @@ from dataclasses import dataclass
 import cma
 import numpy as np
 
-from wipx.baselines.case import Answer, Found, Problem
+from wipx.baselines.case import Answer, Found, Problem, excluded
 from wipx.baselines.prediction_search import PredictionSearch, at, needed
 from wipx.core.errors import check_positive
-from wipx.effects.catalogue import effect_of
+from wipx.effects.catalogue import effect_of, kind_of
 from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.problem import WindowProblem
 
-CONTAINED = ("coulomb", "presliding")  # of a joint's dry frictions only one can act; Stribeck's contains Coulomb's
-SAME = {"geometry/com_offset": "sensor_theta/bias"}  # one parameter for both, since no recording tells them apart
+DRY_FRICTION = "stribeck"  # of a joint's dry frictions only one can act; Stribeck's contains Coulomb's
 FIRST_SHARE = 0.6  # of the time, for all effects; the rest for those that are kept
 SPREAD = (0.02, 0.2)  # of the first candidates, shares of the search intervals
 NO_PEAK = 0.2  # share by which the static level may exceed Coulomb's and still be called Coulomb friction
@@ -82,15 +81,11 @@ class AllAtOnce:
 
 
 def _all_together(case: Problem) -> tuple[str, ...]:
-    """Effects that can act together, as many as possible."""
-    names = case.vocabulary
-    contained = {
-        name
-        for name in names
-        for site, _, kind in [name.partition("/")]
-        if kind in CONTAINED and f"{site}/stribeck" in names
-    }
-    return tuple(name for name in names if name not in contained and name not in SAME.values())
+    """Effects that can act together, as many as possible; one for those that no recording tells apart."""
+    names, plant = case.vocabulary, case.nominal.plant
+    frictions = tuple(name for name in names if kind_of(name).kind == DRY_FRICTION)
+    alike = {other for name in names for other in kind_of(name).indistinguishable}
+    return tuple(name for name in names if name not in alike and not excluded(name, frictions, plant))
 
 
 def _undisturbed(space: ParameterSpace) -> np.ndarray:
@@ -109,4 +104,4 @@ def _named(name: str, values: dict[str, float], weight: float) -> Found:
     site, _, kind = name.partition("/")
     if kind == "stribeck" and values["F_s"] < (1.0 + NO_PEAK) * values["F_c"]:
         return Found(f"{site}/coulomb", {"F_c": values["F_c"]}, weight)
-    return Found(name, values, weight, (SAME[name],) if name in SAME else ())
+    return Found(name, values, weight, kind_of(name).indistinguishable)

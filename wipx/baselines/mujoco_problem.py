@@ -14,6 +14,7 @@ import numpy as np
 
 from wipx.baselines.prediction_search import at
 from wipx.core.model import Model, ModelBatch
+from wipx.effects.catalogue import kind_of
 from wipx.identify.prediction import DIVERGED, Predictor
 from wipx.identify.problem import WindowProblem
 from wipx.identify.windows import Windows
@@ -29,7 +30,7 @@ ON_SIGNALS = ("delay", "scale", "bias")  # effects that the hooks apply
 
 def is_expressible(effect: str) -> bool:
     """Whether the toolbox can have an effect "site/kind"."""
-    return effect.partition("/")[2] in (*BUILT_IN, *IN_THE_BODY, *ON_SIGNALS)
+    return kind_of(effect).built_in in BUILT_IN or effect.partition("/")[2] in (*IN_THE_BODY, *ON_SIGNALS)
 
 
 @dataclass(frozen=True)

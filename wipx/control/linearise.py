@@ -6,15 +6,12 @@ import numpy as np
 
 from wipx.core.load import BALANCE
 from wipx.core.model import Model, ModelBatch
+from wipx.effects.catalogue import kind_of, kinds
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
 STEP = 1e-5  # [s] of one simulated step, from which accelerations are read off
 REACH = 1e-4  # [m, rad, m/s, rad/s, N, N m] of the differences
-# Effects with a slope at rest. Dry friction, dead zone and backlash have none, and sensors do not move a robot.
-SMOOTH = frozenset(
-    {"viscous", "payload", "inertia", "rotor_inertia", "com_offset", "gain", "back_emf", "spring", "rail_tilt"}
-)
 
 
 @dataclass(frozen=True)
@@ -38,15 +35,16 @@ def linearise(model: Model) -> LinearModel:
 def linearise_completed(model: Model) -> LinearModel:
     """A model with those of its effects that have a slope at rest, about the pitch at which it balances.
 
-    Lags and delays of the actuator are no part of it; see `wipx.control.sampled`. Of the paper's friction (Eq. 5) only
-    the viscous part is: what a joint feels that moves beyond the dead zone.
+    Dry friction, dead zone and backlash have none, and sensors do not move a robot. Lags and delays of the actuator
+    are no part of it; see `wipx.control.sampled`. Of the paper's friction (Eq. 5) only the viscous part is.
     """
-    effects = {name: dict(values) for name, values in model.effects.items() if name.rpartition("/")[2] in SMOOTH}
+    effects: dict[str, dict[str, float]] = {}
     for name, values in model.effects.items():
-        site, _, kind = name.partition("/")
-        if kind == "lagged_stribeck":
-            viscous = effects.setdefault(f"{site}/viscous", {"sigma": 0.0})
-            viscous["sigma"] += values["sigma"]
+        linear = kind_of(name).linear_at_rest
+        if linear:
+            felt = effects.setdefault(f"{name.partition('/')[0]}/{linear}", {})
+            for symbol in kinds()[linear].neutral.keys() & values.keys():
+                felt[symbol] = felt.get(symbol, 0.0) + values[symbol]
     balance = effects.get(BALANCE, {}).get("theta_eq", 0.0)
     return _slopes(Model(model.plant, model.parameters, effects), balance)
 

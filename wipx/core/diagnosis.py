@@ -103,6 +103,10 @@ class FoundEffect:
     share: float
     curve: Curve | None
 
+    def value(self, symbol: str) -> float:
+        """Its number of that symbol [SI]."""
+        return next(p.value for p in self.parameters if p.name == f"{self.name}.{symbol}")
+
 
 @dataclass(frozen=True)
 class Region:

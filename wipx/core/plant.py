@@ -79,6 +79,13 @@ class Plant:
             return self.columns[self.actuated[0]] != "x"
         return False
 
+    def joint_at(self, site: str) -> str:
+        """The joint that physics at `site` is felt at first: itself, that of a sensor, else the driven one."""
+        if site in self.columns:
+            return site
+        measured = {f"sensor_{column}": joint for joint, column in self.columns.items()}
+        return measured.get(site, self.actuated[0])
+
     def unit_of(self, column: str) -> str:
         """SI unit of a recorded column."""
         if column in self.commands or column.startswith("u"):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wipx.core.effect import JOINT_SITES, Effect, Steady
+from wipx.core.effect import JOINT_SITES, Effect, Steady, WithConstant
 from wipx.core.parameters import Parameter
 
 
@@ -12,6 +12,7 @@ def _steady(rate, p, body):
 
 EFFECT = Effect(
     kind="asymmetric_coulomb",
+    words="Coulomb friction that differs by direction on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("F_plus", "level while v > 0", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.0, 0.03)),
@@ -26,4 +27,7 @@ EFFECT = Effect(
     excludes=("coulomb",),
     outside_vocabulary=True,
     steady=Steady("rate", _steady),
+    rows={"LEVEL_PLUS": "F_plus", "LEVEL_MINUS": "F_minus"},
+    parts=("FRICTION",),
+    with_constant=WithConstant("coulomb", {"F_plus": "F_c", "F_minus": "F_c"}),
 )

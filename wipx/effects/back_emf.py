@@ -14,6 +14,7 @@ def _steady(rate, p, body):
 
 EFFECT = Effect(
     kind="back_emf",
+    words="back-EMF of the motor",
     sites=("actuator",),
     parameters=(
         Parameter("k_e", "force lost per speed, k_t^2/R at the joint", "damping", 0.0, 0.0, 3.0, 0.02, grid=(0.02,)),
@@ -23,4 +24,7 @@ EFFECT = Effect(
     source="DC motor equation; Duclusaud, Passault 2025, arXiv:2410.08650",
     outside_vocabulary=True,
     steady=Steady("rate", _steady),
+    rows={"BACK_EMF": "k_e"},
+    parts=("BACK_EMF",),
+    linear_at_rest="back_emf",
 )

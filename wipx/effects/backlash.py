@@ -9,12 +9,14 @@ A free drive as heavy as what it drives is outside this law: it would lose conta
 causes itself.
 """
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Effect, NonSmooth
 from wipx.core.law import clip, law, maximum, minimum
 from wipx.core.parameters import Parameter
+from wipx.effects.lag import rate_of
 
 EFFECT = Effect(
     kind="backlash",
+    words="backlash of the drive",
     sites=("actuator",),
     parameters=(
         Parameter(
@@ -75,6 +77,19 @@ EFFECT = Effect(
     linear_in=("gap",),
     doubt=0.25,  # another drive crosses the gap in another way
     source="Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38(10)",
+    rows={
+        "GAP": "gap",
+        "DRIVE_INERTIA": "drive_inertia",
+        "DRIVE_DAMPING": "drive_damping",
+        "RETURNED": "returned",
+        "CONTACT_RATE": lambda p, body: rate_of(p["contact_time"]),
+    },
+    parts=("BACKLASH",),
+    scan="gaps",
+    # A wide gap before a light drive is crossed as a narrow one, and late flanks have the place of a delay.
+    non_smooth=NonSmooth(
+        ridge={"gap": 1.0, "drive_inertia": -1.0, "drive_damping": -1.0}, imitates={"contact_time": "delay"}
+    ),
 )
 
 HEAVIEST = 0.9  # of the driven inertia, up to which the two are solved together

@@ -1,5 +1,7 @@
 """Every effect, found by name: one module of this package each, no list to edit."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
@@ -9,10 +11,38 @@ from wipx.core.effect import Effect
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.plant import Plant
 
+_REGISTERED: dict[str, Effect] = {}  # from elsewhere, by kind
 
-@cache
+
 def kinds() -> dict[str, Effect]:
     """All effects by kind."""
+    return {**_of_this_package(), **_REGISTERED}
+
+
+def kind_of(name: str) -> Effect:
+    """The effect that a name "site/kind" means."""
+    kind = name.partition("/")[2]
+    return _REGISTERED.get(kind) or _of_this_package()[kind]
+
+
+@contextmanager
+def registered(effect: Effect) -> Iterator[Effect]:
+    """An effect from elsewhere than this package, known while the block runs.
+
+    Raises:
+        InputError: there is an effect of that kind already.
+    """
+    if effect.kind in kinds():
+        raise InputError(f"effect {effect.kind}: there is one of that kind already; choose another name")
+    _REGISTERED[effect.kind] = effect
+    try:
+        yield effect
+    finally:
+        del _REGISTERED[effect.kind]
+
+
+@cache
+def _of_this_package() -> dict[str, Effect]:
     names = sorted(module.name for module in iter_modules(effects.__path__))
     modules = (import_module(f"{effects.__name__}.{name}") for name in names)
     found = [module.EFFECT for module in modules if hasattr(module, "EFFECT")]

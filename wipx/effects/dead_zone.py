@@ -13,12 +13,16 @@ def _steady(command, p, body):
 
 EFFECT = Effect(
     kind="dead_zone",
+    words="dead zone of {place}",
     sites=("actuator",),
     parameters=(Parameter("band", "half width", "force", 0.0, 0.0, 0.5, 0.02, grid=(0.01, 0.05, 0.2)),),
     law="0 for abs(u) < band, else u - band s(u)",
     linear_in=("band",),
     source="Tao, Kokotovic 1996, Adaptive control of systems with actuator and sensor nonlinearities",
-    steady=Steady("command", _steady),
+    steady=Steady("command", _steady, stage=1),
+    rows={"DEAD_BAND": "band"},
+    parts=("DEAD_ZONE",),
+    threshold=True,
 )
 
 

@@ -3,13 +3,15 @@
 With exponent 1 and asymmetry 0 it is the Dahl friction of `presliding`, whose bristle it shares.
 """
 
-from wipx.core.effect import JOINT_SITES, Effect, Steady
+from wipx.core.effect import JOINT_SITES, Effect, Extends, Steady
 from wipx.core.law import law, minimum
 from wipx.core.parameters import Parameter
 from wipx.effects.coulomb import steady
+from wipx.effects.presliding import BRISTLE_ROWS
 
 EFFECT = Effect(
     kind="hysteresis",
+    words="hysteresis (Bouc-Wen) on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("F_c", "level when it is fully built up", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.1, 0.5)),
@@ -37,6 +39,9 @@ EFFECT = Effect(
     excludes=("presliding", "lugre"),
     outside_vocabulary=True,
     steady=Steady("rate", steady),
+    rows={**BRISTLE_ROWS, "EXPONENT": "n", "GAMMA": "gamma"},
+    parts=("HYSTERESIS", "BRISTLE", "DAMPING"),
+    extends=Extends("presliding", ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})),
 )
 
 

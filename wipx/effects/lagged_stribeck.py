@@ -19,6 +19,7 @@ import numpy as np
 from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.law import decay, law, sign
 from wipx.core.parameters import Parameter
+from wipx.effects.lag import rate_of
 
 SAMPLE_PERIOD = 1.0 / 650.0  # [s], paper Sec. IV: control loop of 600 to 700 Hz
 
@@ -29,6 +30,7 @@ def _steady(rate, p, body):
 
 EFFECT = Effect(
     kind="lagged_stribeck",
+    words="lagged Stribeck friction on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("F_s", "static level", "force", 0.0, 0.0, 1.0, 0.03),
@@ -44,6 +46,16 @@ EFFECT = Effect(
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding", "lugre", "viscous"),
     outside_vocabulary=True,
     steady=Steady("rate", _steady),
+    rows={
+        "PAPER_STATIC": "F_s",
+        "PAPER_COULOMB": "F_c",
+        "PAPER_SPEED": "v_s",
+        "PAPER_VISCOUS": "sigma",
+        "PAPER_EPSILON": "epsilon",
+        "PAPER_RATE": lambda p, body: rate_of(lag_of(p["alpha"])),
+    },
+    parts=("PAPER",),
+    linear_at_rest="viscous",  # what a joint feels that moves beyond the dead zone
 )
 
 

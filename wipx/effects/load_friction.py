@@ -9,6 +9,7 @@ from wipx.core.parameters import Parameter
 
 EFFECT = Effect(
     kind="load_friction",
+    words="load-dependent gear friction on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("K_motor", "friction per force of the motor", "ratio", 0.0, 0.0, 1.0, 0.05, grid=(0.0, 0.1)),
@@ -21,6 +22,9 @@ EFFECT = Effect(
     ),
     source="Duclusaud, Passault 2025, Extended friction models for servo actuators, arXiv:2410.08650",
     outside_vocabulary=True,
+    rows={"LOAD_MOTOR": "K_motor", "LOAD_EXTERNAL": "K_external"},
+    parts=("LOAD", "FRICTION"),
+    on_machines=lambda site, plant: True,
 )
 
 

@@ -4,12 +4,16 @@ Canudas de Wit, Olsson, Astrom and Lischinsky (1995); its viscous term is the ef
 The bristle's laws are those of `presliding`.
 """
 
+import numpy as np
+
 from wipx.core.effect import JOINT_SITES, Effect, Steady
 from wipx.core.parameters import Parameter
+from wipx.effects.presliding import held
 from wipx.effects.stribeck import steady
 
 EFFECT = Effect(
     kind="lugre",
+    words="LuGre friction (damped bristle with a Stribeck peak) on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02),
@@ -28,4 +32,12 @@ EFFECT = Effect(
     excludes=("coulomb", "asymmetric_coulomb", "stribeck", "presliding"),
     outside_vocabulary=True,
     steady=Steady("rate", steady),
+    rows={
+        "SLIDING": "F_c",
+        "PEAK": "F_s",
+        "PEAK_SPEED": "v_s",
+        "BRISTLE": lambda p, body: held(p["stiffness"], np.maximum(p["F_c"], p["F_s"])),
+        "BRISTLE_DAMPING": lambda p, body: held(p["damping"], np.maximum(p["F_c"], p["F_s"])),
+    },
+    parts=("BRISTLE", "DAMPING"),
 )

@@ -5,6 +5,7 @@ from wipx.core.parameters import Parameter
 
 EFFECT = Effect(
     kind="payload",
+    words="payload on the body",
     sites=("geometry",),
     parameters=(
         Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05, grid=(0.05,)),
@@ -14,6 +15,7 @@ EFFECT = Effect(
     linear_in=("mass",),
     source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
     needs=("body_mass",),
+    linear_at_rest="payload",
 )
 
 

@@ -13,12 +13,15 @@ def _steady(rate, p, body):
 
 EFFECT = Effect(
     kind="quadratic_drag",
+    words="quadratic drag on {place}",
     sites=JOINT_SITES,
     parameters=(Parameter("c", "drag coefficient", "drag", 0.0, 0.0, 3.0, 0.02, grid=(0.02, 0.1)),),
     law="-c v abs(v)",
     linear_in=("c",),
     source="Kaheman, Kaiser, Strom, Kutz, Brunton 2019, arXiv:1909.08574",
     steady=Steady("rate", _steady),
+    rows={"DRAG": "c"},
+    parts=("DRAG",),
 )
 
 

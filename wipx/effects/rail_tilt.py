@@ -13,6 +13,7 @@ def _steady(place, p, body):
 
 EFFECT = Effect(
     kind="rail_tilt",
+    words="tilt of the rail",
     sites=("environment",),
     parameters=(
         Parameter(
@@ -24,4 +25,8 @@ EFFECT = Effect(
     source="rigid-body mechanics",
     needs=("translation",),
     steady=Steady("coordinate", _steady),
+    rows={"TILT": "angle"},
+    parts=("TILT",),
+    linear_at_rest="rail_tilt",
+    constant_force=True,
 )

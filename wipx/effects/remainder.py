@@ -4,6 +4,8 @@ It stands in for what a diagnosis cannot name. Its curve is drawn from a Gaussia
 `wipx.diagnosis.residuals.discrepancy`; here it is only evaluated.
 """
 
+import numpy as np
+
 from wipx.core.effect import JOINT_SITES, Effect
 from wipx.core.parameters import Parameter
 
@@ -13,6 +15,7 @@ HIGHEST = 1e9
 
 EFFECT = Effect(
     kind="remainder",
+    words="force of unknown origin on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("signal", "0, 1 coordinates, 2, 3 rates, 4, 5 commands, 6 time", "ratio", 0.0, 0.0, 6.0, 0.0),
@@ -25,4 +28,12 @@ EFFECT = Effect(
     linear_in=tuple(f"f{i}" for i in range(KNOTS)),
     source="Rasmussen, Williams 2006, Gaussian Processes for Machine Learning, ch. 2",
     outside_vocabulary=True,
+    rows={
+        "REMAINDER_SIGNAL": "signal",
+        "REMAINDER_FACTOR": "factor",
+        "REMAINDER_LOW": "low",
+        "REMAINDER_PER_UNIT": lambda p, body: (KNOTS - 1) / np.maximum(p["high"] - p["low"], 1e-12),
+        "REMAINDER": lambda p, body: np.array([p[f"f{i}"] for i in range(KNOTS)]),
+    },
+    parts=lambda p: ("REMAINDER", "FRICTION") if np.any(p["factor"] < 0.0) else ("REMAINDER",),
 )

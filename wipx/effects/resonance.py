@@ -1,10 +1,18 @@
 """A resonance: something swings along with a joint, such as a sloshing payload or a flexible pole."""
 
+import numpy as np
+
 from wipx.core.effect import JOINT_SITES, Effect
 from wipx.core.parameters import Parameter
 
+
+def _pulsation(frequency):
+    return 2.0 * np.pi * frequency
+
+
 EFFECT = Effect(
     kind="resonance",
+    words="resonance (something swings along) on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("m", "what swings, at the joint", "inertia", 0.0, 0.0, 10.0, 0.1, grid=(0.1,)),
@@ -24,4 +32,10 @@ EFFECT = Effect(
     linear_in=("m",),
     source="Ibrahim 2005, Liquid Sloshing Dynamics, ch. 5 (equivalent mechanical models)",
     outside_vocabulary=True,
+    rows={
+        "SWING": "m",
+        "SWING_STIFFNESS": lambda p, body: _pulsation(p["f"]) ** 2,
+        "SWING_DAMPING": lambda p, body: 2.0 * p["zeta"] * _pulsation(p["f"]),
+    },
+    parts=("SWING",),
 )

@@ -12,6 +12,7 @@ def _steady(place, p, body):
 
 EFFECT = Effect(
     kind="ripple",
+    words="torque ripple (cogging) of the motor",
     sites=("actuator",),
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),
@@ -30,4 +31,11 @@ EFFECT = Effect(
     linear_in=("A",),
     source="Holtz, Springob 1996, Identification and compensation of torque ripple, IEEE TIE 43(2)",
     steady=Steady("coordinate", _steady),
+    rows={
+        "RIPPLE": "A",
+        "RIPPLE_PERIODS": lambda p, body: p["n"] / body.get("wheel_radius", 1.0),
+        "RIPPLE_PHASE": "phase",
+    },
+    parts=("RIPPLE",),
+    scan="periods",
 )

@@ -13,6 +13,7 @@ def _steady(command, p, body):
 
 EFFECT = Effect(
     kind="saturation",
+    words="saturation of {place}",
     sites=("actuator",),
     parameters=(
         Parameter(
@@ -27,7 +28,11 @@ EFFECT = Effect(
     ),
     law="F = clip(u, -F_max, F_max)",
     source="force range of actuators, MuJoCo documentation",
-    steady=Steady("command", _steady),
+    steady=Steady("command", _steady, stage=3),
+    rows={"FORCE_MAX": "F_max"},
+    parts=("SATURATION",),
+    threshold=True,
+    scan="force_limits",
 )
 
 

@@ -1,11 +1,19 @@
 """Torque-speed limit: the driving force falls to zero at the motor's free speed."""
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Contains, Effect, FittedEffect
 from wipx.core.law import above, law, maximum
 from wipx.core.parameters import Parameter
 
+OUT_OF_REACH = 3.0  # times the largest speed, a free speed that is never felt
+
+
+def _is_out_of_reach(fitted: FittedEffect) -> bool:
+    return fitted.values["v_free"] > OUT_OF_REACH * fitted.top_speed
+
+
 EFFECT = Effect(
     kind="speed_limit",
+    words="torque-speed limit of the motor",
     sites=("actuator",),
     parameters=(
         Parameter(
@@ -21,6 +29,11 @@ EFFECT = Effect(
     ),
     law="driving: abs(F) <= F_stall (1 - abs(v)/v_free); braking: abs(F) <= F_stall",
     source="torque-speed line of a DC motor, BAM documentation, github.com/Rhoban/bam",
+    rows={"STALL": "F_stall", "FREE_SPEED": "v_free"},
+    parts=("SPEED_LIMIT",),
+    threshold=True,
+    scan="speed_limits",
+    contains=Contains("saturation", when=_is_out_of_reach, symbols={"F_stall": "F_max"}),
 )
 
 

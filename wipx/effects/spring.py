@@ -10,6 +10,7 @@ def _steady(place, p, body):
 
 EFFECT = Effect(
     kind="spring",
+    words="spring or cable that pulls on the carriage",
     sites=("environment",),
     parameters=(
         Parameter("k", "stiffness", "stiffness", 0.0, 0.0, 3.0, 0.02, grid=(0.05,)),
@@ -20,4 +21,7 @@ EFFECT = Effect(
     source="rigid-body mechanics",
     needs=("translation",),
     steady=Steady("coordinate", _steady),
+    rows={"SPRING": "k", "SPRING_REST": "x0"},
+    parts=("SPRING",),
+    linear_at_rest="spring",
 )

@@ -1,11 +1,22 @@
 """A sticky spot: extra Coulomb friction on a stretch of the rail."""
 
-from wipx.core.effect import Effect
+import numpy as np
+
+from wipx.core.effect import Contains, Effect, FittedEffect
 from wipx.core.law import law, maximum, minimum
 from wipx.core.parameters import Parameter
 
+WHOLE_WAY = 0.9  # share of the rows from which a spot is the whole rail
+
+
+def _is_the_whole_way(fitted: FittedEffect) -> bool:
+    x, values = fitted.positions, fitted.values
+    return bool(np.mean((x >= values["lo"]) & (x <= values["hi"])) > WHOLE_WAY)
+
+
 EFFECT = Effect(
     kind="sticky_spot",
+    words="sticky spot on the rail",
     sites=("translation",),
     parameters=(
         Parameter("F_c", "extra level", "force", 0.0, 0.0, 1.0, 0.05),
@@ -15,6 +26,11 @@ EFFECT = Effect(
     law="-F_c s(v) for lo <= x <= hi",
     linear_in=("F_c",),
     source="Popovic, Goldenberg 1998, Modeling of friction using spectral analysis, IEEE TRA 14(1)",
+    rows={"SPOT": "F_c", "SPOT_LOW": "lo", "SPOT_HIGH": "hi"},
+    parts=("SPOT", "FRICTION"),
+    stretch=("lo", "hi"),
+    scan="stretches",
+    contains=Contains("coulomb", when=_is_the_whole_way),
 )
 
 

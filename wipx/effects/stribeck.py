@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wipx.core.effect import JOINT_SITES, Effect, Steady
+from wipx.core.effect import JOINT_SITES, Contains, Effect, FittedEffect, Steady
 from wipx.core.law import decay, law, maximum
 from wipx.core.parameters import Parameter
 
@@ -12,8 +12,17 @@ def steady(rate, p, body):
     return -np.sign(rate) * (p["F_c"] + np.vectorize(bump)(rate, p["F_s"], p["F_c"], p["v_s"]))
 
 
+CERTAIN = 2.0  # standard deviations by which the static level must exceed Coulomb's
+
+
+def _has_no_certain_peak(fitted: FittedEffect) -> bool:
+    peak = fitted.values["F_s"] - fitted.values["F_c"]
+    return not peak > CERTAIN * fitted.deviation({"F_s": 1.0, "F_c": -1.0})
+
+
 EFFECT = Effect(
     kind="stribeck",
+    words="Stribeck friction on {place}",
     sites=JOINT_SITES,
     parameters=(
         Parameter("F_c", "Coulomb level", "force", 0.0, 0.0, 1.0, 0.02, grid=(0.02,)),
@@ -28,6 +37,15 @@ EFFECT = Effect(
     source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7)",
     excludes=("coulomb", "asymmetric_coulomb"),
     steady=Steady("rate", steady),
+    rows={
+        "LEVEL_PLUS": "F_c",
+        "LEVEL_MINUS": "F_c",
+        "STATIC": "F_s",
+        "COULOMB": "F_c",
+        "STRIBECK_SPEED": "v_s",
+    },
+    parts=("FRICTION", "STRIBECK"),
+    contains=Contains("coulomb", when=_has_no_certain_peak),
 )
 
 

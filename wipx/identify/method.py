@@ -6,11 +6,12 @@ from typing import Literal
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import Plant
+from wipx.effects.catalogue import kinds, vocabulary
 from wipx.identify.friction import IdentifiedFriction, JointFriction
 
 AS_IT_IS = ("none", "completed")  # physics that nothing is searched or drawn for
-BUILT_IN = ("viscous", "coulomb", "rotor_inertia")  # of every joint: what physics engines call damping,
-# friction loss and armature; with the gear of the motor seven numbers for a plant of two joints
+BUILT_IN = ("damping", "frictionloss", "armature", "gear")  # what physics engines have for joints and motors; seven
+# numbers for a plant of two joints
 
 
 @dataclass(frozen=True)
@@ -68,5 +69,6 @@ class Method:
 
 def built_in(plant: Plant) -> tuple[str, ...]:
     """Effects that a physics engine has as parameters of its own."""
-    joints = tuple(f"{joint}/{kind}" for joint in plant.joints for kind in BUILT_IN)
-    return (*joints, "actuator/gain")
+    kinds_of = {effect.built_in: kind for kind, effect in kinds().items()}
+    names = (f"{site}/{kinds_of[parameter]}" for site in (*plant.joints, "actuator") for parameter in BUILT_IN)
+    return tuple(name for name in names if name in vocabulary(plant))

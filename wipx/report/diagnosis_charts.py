@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.diagnosis import ConsideredEffect, Curve, Diagnosis, ErrorMap
 from wipx.core.plant import COLUMN_UNITS
-from wipx.core.words import effect_in_words, site_in_words
+from wipx.effects.words import effect_in_words, site_in_words
 from wipx.report.charts import comparison_data, json_number
 from wipx.report.diagnosis_words import capitalised
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from wipx.core.diagnosis import ConsideredEffect, Diagnosis
 from wipx.core.results import Estimate
-from wipx.core.words import effect_in_words, site_in_words
+from wipx.effects.words import effect_in_words, site_in_words
 from wipx.report import diagnosis_words as words
 from wipx.report.diagnosis_charts import bar_length, full_bar, ranked_candidates
 from wipx.report.numbers import MISSING, compact, significant

@@ -2,7 +2,7 @@
 
 from wipx.core.diagnosis import Diagnosis, FoundEffect
 from wipx.core.results import FitErrors
-from wipx.core.words import effect_in_words
+from wipx.effects.words import effect_in_words
 from wipx.report.diagnosis_words import percent
 from wipx.report.numbers import compact
 

@@ -1,7 +1,7 @@
 """A diagnosis as a few lines for the terminal."""
 
 from wipx.core.diagnosis import Diagnosis, FoundEffect
-from wipx.core.words import effect_in_words
+from wipx.effects.words import effect_in_words
 from wipx.report.diagnosis_words import (
     VERDICTS,
     capitalised,

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, LeftForce, NextExperiment, Period, Region
 from wipx.core.results import Estimate
-from wipx.core.words import effect_in_words, site_in_words
+from wipx.effects.words import effect_in_words, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
 
 VERDICTS = MappingProxyType(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wipx.core.control_result import ControlResult
 from wipx.core.story import NamedEffect, SignalError, Story
-from wipx.core.words import effect_in_words
+from wipx.effects.words import effect_in_words
 from wipx.report.control_table import improvement
 from wipx.report.diagnosis_words import VERDICTS, capitalised
 from wipx.report.files import write_whole

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wipx.sim.rows import W
+from wipx.sim.rows import MOST, W
 
 # Rows; a pair belongs to joints 0 and 1.
 (
@@ -16,8 +16,8 @@ from wipx.sim.rows import W
     PUSH, PUSH1,  # and the generalised forces that bring it there
     DURATION,  # of the step; 0 where a lane pauses
     LOADED,  # share of the payload event's mass that is on the body
-    N_ROWS,
-) = range(18)  # fmt: skip
+    N_ROWS, *_,
+) = range(MOST)  # fmt: skip
 
 
 def _empty() -> np.ndarray:

@@ -4,9 +4,10 @@ Effects on the signals (delays, scales, biases) are not in it, and friction only
 """
 
 from wipx.core.model import Model
-from wipx.sim.mechanism import LEAST, Link, Part, mechanism, value
+from wipx.effects.catalogue import kind_of
+from wipx.sim.mechanism import LEAST, Link, Part, mechanism
 
-BUILT_IN = ("viscous", "coulomb", "gain")  # what MuJoCo has as damping, frictionloss and gear
+BUILT_IN = ("damping", "frictionloss", "gear")  # parameters of MuJoCo's that effects may be (`Effect.built_in`)
 
 
 def mjcf(model: Model, step: float, *, built_in: tuple[str, ...] = ()) -> str:
@@ -15,12 +16,11 @@ def mjcf(model: Model, step: float, *, built_in: tuple[str, ...] = ()) -> str:
     Args:
         model: Rigid body, geometry and environment.
         step: Of the integrator [s].
-        built_in: Kinds of `BUILT_IN` that the joints and motors shall have as MuJoCo's own; others, and all by
+        built_in: Those of `BUILT_IN` that the joints and motors shall have; effects that are others, and all by
             default, are left to whoever steps the engine.
     """
     plant = model.plant
-    gain = value(model, "actuator/gain", "k", 1.0) if "gain" in built_in else 1.0
-    gear = model.parameters["input_gain"] * gain
+    gear = model.parameters["input_gain"] * (_own(model, "actuator", "gear", 1.0) if "gear" in built_in else 1.0)
     motors = "".join(
         f'<motor name="{command}" joint="{joint}" gear="{gear!r}"/>'
         for command, joint in zip(plant.commands, plant.actuated, strict=True)
@@ -41,12 +41,21 @@ def mjcf(model: Model, step: float, *, built_in: tuple[str, ...] = ()) -> str:
 
 def _joint(model: Model, link: Link, built_in: tuple[str, ...]) -> str:
     axis = " ".join(repr(x) for x in link.axis)
-    damping = value(model, f"{link.joint}/viscous", "sigma", 0.0) if "viscous" in built_in else 0.0
-    friction = value(model, f"{link.joint}/coulomb", "F_c", 0.0) if "coulomb" in built_in else 0.0
+    damping = _own(model, link.joint, "damping", 0.0) if "damping" in built_in else 0.0
+    friction = _own(model, link.joint, "frictionloss", 0.0) if "frictionloss" in built_in else 0.0
     return (
         f'<joint name="{link.joint}" type="{"slide" if link.slides else "hinge"}" axis="{axis}" '
         f'armature="{link.rotor!r}" damping="{damping!r}" frictionloss="{friction!r}"/>'
     )
+
+
+def _own(model: Model, site: str, parameter: str, absent: float) -> float:
+    """What an effect at a site is as a parameter of MuJoCo's; `absent` where there is no such effect."""
+    for name, values in model.effects.items():
+        effect = kind_of(name)
+        if name.startswith(f"{site}/") and effect.built_in == parameter:
+            return values[effect.parameters[0].name]
+    return absent
 
 
 def _masses(link: Link) -> str:

@@ -1,8 +1,12 @@
 """Names of the rows that the compiled simulator computes with.
 
 One rollout is one column ("lane"). A pair of rows `X, X1` belongs to joints 0 and 1 (or to
-the commands that act on them).
+the commands that act on them). A name in the lists below gets the next number; the last of a list counts them.
 """
+
+from wipx.effects.remainder import KNOTS
+
+MOST = 1000  # rows that a list has numbers for
 
 W = 64  # lanes that a block has room for
 TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up to a multiple of it
@@ -27,12 +31,14 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     PAPER_VISCOUS, PAPER_VISCOUS1, PAPER_EPSILON, PAPER_EPSILON1, PAPER_RATE, PAPER_RATE1,
     REMAINDER_SIGNAL, REMAINDER_SIGNAL1, REMAINDER_FACTOR, REMAINDER_FACTOR1, REMAINDER_LOW, REMAINDER_LOW1,
     REMAINDER_PER_UNIT, REMAINDER_PER_UNIT1, REMAINDER, REMAINDER1,  # the first knot of each joint, then the others
-    _R2, _R3, _R4, _R5, _R6, _R7, _R8, _R9, _R10, _R11, _R12, _R13, _R14, _R15, _R16, _R17,
+    *_,
+) = range(MOST)  # fmt: skip
+(
     SWING, SWING1, SWING_STIFFNESS, SWING_STIFFNESS1, SWING_DAMPING, SWING_DAMPING1,  # per mass
     SMOOTHING, SMOOTHING1,  # speed over which dry friction builds up, 0 for sticking
     BIAS, BIAS1, SCALE, SCALE1, SENSOR_DELAY, SENSOR_DELAY1,
-    N_COEFFICIENTS,
-) = range(128)  # fmt: skip
+    N_COEFFICIENTS, *_,
+) = range(REMAINDER + 2 * KNOTS, MOST)  # fmt: skip
 
 # State of a rollout, carried from step to step.
 (
@@ -46,8 +52,8 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     SWING_PLACE, SWING_PLACE1, SWING_RATE, SWING_RATE1,
     EXTRA, EXTRA1,  # accelerations that an observer adds
     STARTED,  # 0 before the first step, then 1
-    N_STATES,
-) = range(N_COEFFICIENTS, N_COEFFICIENTS + 30)  # fmt: skip
+    N_STATES, *_,
+) = range(N_COEFFICIENTS, MOST)  # fmt: skip
 
 # Scratch of one step.
 (
@@ -67,8 +73,8 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     MEASURED, MEASURED1, MEASURED_RATE, MEASURED_RATE1,  # what the controller works with
     NOISE, NOISE1, NOISE_RATE, NOISE_RATE1,
     REFERENCE, REFERENCE1, REFERENCE_RATE, REFERENCE_RATE1,
-    N_ROWS,
-) = range(N_STATES, N_STATES + 69)  # fmt: skip
+    N_ROWS, *_,
+) = range(N_STATES, MOST)  # fmt: skip
 
 STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
 
@@ -80,5 +86,5 @@ STATES = N_STATES - N_COEFFICIENTS  # rows of a carried state
     ON_BRISTLE, ON_BRISTLE1, ON_HYSTERESIS, ON_HYSTERESIS1, ON_PAPER, ON_PAPER1, ON_SENSOR_DELAY, ON_SMOOTHING,
     ON_RAMP, ON_REMAINDER, ON_REMAINDER1, ON_SWING, ON_SWING1, ON_REPORT,
     ON_ENGINE,  # moves the rigid body
-    N_FLAGS,
-) = range(38)  # fmt: skip
+    N_FLAGS, *_,
+) = range(MOST)  # fmt: skip

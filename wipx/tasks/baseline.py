@@ -11,7 +11,7 @@ from wipx.baselines.learned_simulator import learned_simulator
 from wipx.core.effect import Effect
 from wipx.core.plant import Plant
 from wipx.core.results import HORIZON, FitErrors
-from wipx.effects.catalogue import effect_of
+from wipx.effects.catalogue import effect_of, kind_of
 from wipx.identify.evaluation import Judge
 from wipx.identify.windows import check_long_enough
 from wipx.recordings.model_file import write_model
@@ -92,14 +92,21 @@ def diagnosis(answer: Answer, errors: FitErrors, case: Problem) -> dict[str, obj
 
 
 def _regions(answer: Answer) -> list[dict[str, object]]:
-    """Where a sticky spot is; other effects act everywhere."""
-    spots = [found.parameters for found in answer.found if found.name.endswith("/sticky_spot")]
-    return [{"signal": "x", "low": spot["lo"], "high": spot["hi"], "share": 1.0} for spot in spots]
+    """Where effects are that act on a stretch of their joint's way."""
+    plant, regions = answer.model.plant, []
+    for found in answer.found:
+        ends = kind_of(found.name).stretch
+        if ends is not None:
+            signal = plant.columns[plant.joint_at(found.name.partition("/")[0])]
+            low, high = (found.parameters[symbol] for symbol in ends)
+            regions.append({"signal": signal, "low": low, "high": high, "share": 1.0})
+    return regions
 
 
 def _times(answer: Answer, case: Problem) -> list[dict[str, object]]:
-    """From when on a payload is there, in each recording."""
-    events = [found.parameters["t0"] for found in answer.found if found.name.endswith("/payload_event")]
+    """From when on an effect acts that begins during the recordings, in each."""
+    begins = [(found, kind_of(found.name).begins) for found in answer.found]
+    events = [found.parameters[symbol] for found, symbol in begins if symbol]
     return [
         {"low": t0, "high": float(recording.t[-1]), "share": 1.0, "recording": recording.name}
         for t0 in events

@@ -17,7 +17,6 @@ from wipx.core.diagnosis import (
 )
 from wipx.core.model import Model
 from wipx.core.results import Estimate, FitErrors, Trace
-from wipx.core.words import effect_in_words
 from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
@@ -33,9 +32,10 @@ from wipx.diagnosis.next_experiment.choice import Question, next_experiment
 from wipx.diagnosis.residuals.discrepancy import curve_of
 from wipx.diagnosis.residuals.remaining_forces import horizon_errors, left_forces
 from wipx.diagnosis.residuals.residual_tests import Shape
-from wipx.diagnosis.selection.nested_laws import CONTAINS, reduced_effects
+from wipx.diagnosis.selection.nested_laws import reduced_effects, simple_law
 from wipx.diagnosis.selection.search import Selection
 from wipx.effects.catalogue import effect_of
+from wipx.effects.words import effect_in_words
 from wipx.report.diagnosis_sentence import sentence
 from wipx.sim.simulator import StateFeedback
 
@@ -194,9 +194,8 @@ def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> l
 
 def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
     """Whether a rival is the same law with more to it that is not needed."""
-    contained = f"{name.partition('/')[0]}/{CONTAINS.get(name.partition('/')[2])}"
     replaced = reduced_effects(other, data)
-    return contained == effect or (replaced is not None and effect in replaced)
+    return simple_law(name) == effect or (replaced is not None and effect in replaced)
 
 
 def _unexplained(context: Context, rest: Rest) -> Unexplained:

@@ -1,33 +1,42 @@
 """One law in the place of two effects: dry friction that differs by direction is Coulomb friction and a constant force.
 
 Both are in the vocabulary, so that recordings which show the one show the other too. An answer that names the two must
-say so.
+say so. Which laws are two (`Effect.with_constant`, `Effect.constant_force`) the effects say themselves.
 """
+
+from collections.abc import Iterator, Mapping
 
 from wipx.core.diagnosis import Combined
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.search import Selection
+from wipx.effects.catalogue import kind_of, kinds
 
-CONSTANT = ("rail_tilt", "com_offset", "bias", "offset")  # kinds that act as a constant force on a joint
 TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
 
 def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined, ...]:
-    """Frictions that differ by direction which explain a Coulomb friction and a constant force of a fit as well."""
+    """Laws that explain an effect of a fit and a constant force as well as these two."""
     found = []
-    for friction in (effect for effect in fit.effects if effect.endswith("/coulomb")):
-        for constant in (effect for effect in fit.effects if effect.partition("/")[2] in CONSTANT):
-            name = f"{friction.partition('/')[0]}/asymmetric_coulomb"
-            level = fit.hypothesis.values[f"{friction}.F_c"]
-            rest = tuple(effect for effect in fit.effects if effect not in (friction, constant))
-            start = {**fit.hypothesis.values, f"{name}.F_plus": level, f"{name}.F_minus": level}
+    values = fit.hypothesis.values
+    for effect, name, symbols in _laws_with_constants(fit):
+        for constant in (other for other in fit.effects if kind_of(other).constant_force):
+            rest = tuple(other for other in fit.effects if other not in (effect, constant))
+            start = {**values, **{f"{name}.{own}": values[f"{effect}.{other}"] for own, other in symbols.items()}}
             hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
             other = context.fitter.converged(context.fitter.fit(hypothesis, context.fitter.escape_levels(fit)))
             lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
             if lead > -TOLD_APART:
-                values = other.hypothesis.values
-                parameters = {symbol: values[f"{name}.{symbol}"] for symbol in ("F_plus", "F_minus")}
-                found.append(Combined(name, (friction, constant), lead, parameters))
+                parameters = {symbol: other.hypothesis.values[f"{name}.{symbol}"] for symbol in symbols}
+                found.append(Combined(name, (effect, constant), lead, parameters))
     return tuple(found)
+
+
+def _laws_with_constants(fit: Fit) -> Iterator[tuple[str, str, Mapping[str, str]]]:
+    """Effects of a fit, the law that each is together with a constant force, and its symbols by those of that law."""
+    for effect in fit.effects:
+        site, _, kind = effect.partition("/")
+        for law in kinds().values():
+            if law.with_constant is not None and law.with_constant.kind == kind:
+                yield effect, f"{site}/{law.kind}", law.with_constant.symbols

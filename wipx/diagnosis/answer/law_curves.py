@@ -9,10 +9,9 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.residuals.discrepancy import process_mean
 from wipx.diagnosis.residuals.residual_tests import Shape, residual_tests
-from wipx.effects.catalogue import effect_of
+from wipx.effects.catalogue import effect_of, kind_of
 
 POINTS = 201
-DRIVE = ("offset", "dead_zone", "gain", "saturation")  # in the order in which they act, contract section 3
 
 
 def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
@@ -78,9 +77,8 @@ def added_force(model: Model, effect: str, at: np.ndarray) -> np.ndarray:
 def _driven(model: Model, command: np.ndarray) -> np.ndarray:
     """Force of the drive at constant commands, shape (N,) [N or N m]."""
     force = command * model.parameters["input_gain"]
-    for name in (f"actuator/{kind}" for kind in DRIVE):
-        if name in model.effects:
-            steady = effect_of(name, model.plant).steady
-            assert steady is not None
-            force = force + steady.force(force, model.effects[name], model.parameters)
+    laws = [(steady, values) for name, values in model.effects.items() if (steady := kind_of(name).steady) is not None]
+    for steady, values in sorted(laws, key=lambda law: law[0].stage):
+        if steady.over == "command":
+            force = force + steady.force(force, values, model.parameters)
     return force

@@ -15,6 +15,7 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import motion_of
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.effects.catalogue import kind_of
 
 BINS = 24  # of a map, along each axis
 RUN_BINS = 40  # along each recording
@@ -63,22 +64,25 @@ def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, f
 def _named_regions(
     effects: tuple[FoundEffect, ...], signals: Mapping[str, np.ndarray], excess: np.ndarray, data: RecordingBatch
 ) -> tuple[Region, ...]:
-    """The stretch of the rail of a sticky spot."""
+    """Where on its way a joint meets an effect that acts on a stretch of it."""
     regions = []
     for effect in effects:
-        if effect.name.endswith("/sticky_spot"):
-            low, high = (p.value for p in effect.parameters if p.name.endswith((".lo", ".hi")))
-            inside = (signals["x"] >= low) & (signals["x"] <= high)
-            regions.append(Region("x", low, high, _share(excess, inside, data)))
+        stretch = kind_of(effect.name).stretch
+        if stretch is not None:
+            low, high = (effect.value(symbol) for symbol in stretch)
+            signal = data.plant.columns[data.plant.joint_at(effect.name.partition("/")[0])]
+            inside = (signals[signal] >= low) & (signals[signal] <= high)
+            regions.append(Region(signal, low, high, _share(excess, inside, data)))
     return tuple(regions)
 
 
 def _periods(effects: tuple[FoundEffect, ...], excess: np.ndarray, data: RecordingBatch) -> tuple[Period, ...]:
-    """From the payload's coming to the end of each recording."""
+    """From when an effect begins to act to the end of each recording."""
     periods = []
     for effect in effects:
-        if effect.name.endswith("/payload_event"):
-            begin = next(p.value for p in effect.parameters if p.name.endswith(".t0"))
+        symbol = kind_of(effect.name).begins
+        if symbol:
+            begin = effect.value(symbol)
             for r, recording in enumerate(data.recordings):
                 end = float(recording.t[-1])
                 column = np.zeros_like(data.rows)

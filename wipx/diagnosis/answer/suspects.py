@@ -26,7 +26,7 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.residuals.discrepancy import with_curve
-from wipx.diagnosis.selection.nested_laws import CONTAINS, reduced_values
+from wipx.diagnosis.selection.nested_laws import reduced_values, simple_law
 from wipx.diagnosis.selection.search import STARTS, Selection
 from wipx.effects.catalogue import check_together, effect_of, vocabulary
 from wipx.recordings.model_file import model_from_mapping
@@ -144,8 +144,8 @@ class _Asked:
         for effect in self.answer.effects:
             other_site, _, other = effect.name.partition("/")
             excludes = other in known[self.name].excludes or kind in known[effect.name].excludes
-            nested = kind == CONTAINS.get(other) or other == CONTAINS.get(kind)
-            if (site == other_site and (excludes or nested)) or self.name in effect.equivalent:
+            nested = self.name == simple_law(effect.name) or effect.name == simple_law(self.name)
+            if (site == other_site and excludes) or nested or self.name in effect.equivalent:
                 found.append(effect.name)
         return tuple(found)
 

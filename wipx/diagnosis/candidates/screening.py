@@ -28,13 +28,12 @@ CHUNK = 24  # models simulated at once; bounds the memory
 Scan = Callable[[InnovationFitter, Fit, np.ndarray], np.ndarray]
 
 SCANS: dict[str, Scan] = {
-    "ripple": ripples,
-    "sticky_spot": sticky_spots,
-    "saturation": saturations,
-    "speed_limit": speed_limits,
-    "backlash": plays,
-}  # first guesses that take more than a grid
-AS_THEY_ARE = ("backlash",)  # guesses that no dose makes better: what a gap does is not proportional to it
+    "periods": ripples,
+    "stretches": sticky_spots,
+    "force_limits": saturations,
+    "speed_limits": speed_limits,
+    "gaps": plays,
+}  # first guesses that take more than a grid, by `Effect.scan`
 
 
 @dataclass(frozen=True)
@@ -114,7 +113,7 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     base = fit.white.ravel()
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
-    scan = SCANS.get(effect.kind)
+    scan = SCANS[effect.scan] if effect.scan else None
     atoms = (
         perturbations(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
     )
@@ -129,7 +128,7 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
         slope, size = change @ left, np.sum(change**2, axis=1)
         for i, atom in enumerate(part):
             best = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
-            dose = best if grown.any() and effect.kind not in AS_THEY_ARE else 1.0
+            dose = best if grown.any() and effect.non_smooth is None else 1.0  # what a gap does is not proportional
             values = np.where(grown, neutral + dose * (atom - neutral), atom)
             if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
                 continue

@@ -50,7 +50,6 @@ PARTS = 6  # of the stretches, each predicted by numbers that suit the others
 DAMPED = 1e-3  # relative, of the step to these numbers
 STEPS = (1.0, 0.3)  # shares of it that are tried; none of it where neither is an improvement
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
-MACHINE = ("offset", "load_friction")  # kinds that section 6 of the contract has beside those of section 3
 STEP = 2.0  # times the simulator's usual step, exact enough where no law is
 TOO_FAR = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
 
@@ -115,9 +114,8 @@ class ForecastFitter(Fitter):
 
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
-        if effect.kind == "rotor_inertia":
-            return self.data.joints > 1 and not name.startswith("pitch/")
-        return not effect.outside_vocabulary or effect.kind in MACHINE
+        site, machines = name.partition("/")[0], effect.on_machines
+        return not effect.outside_vocabulary or bool(machines and machines(site, self.data.plant))
 
     @property
     def data(self) -> RecordingBatch:

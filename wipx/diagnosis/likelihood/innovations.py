@@ -19,12 +19,12 @@ from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, wh
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import stretches
+from wipx.effects.catalogue import kind_of
 from wipx.sim.analytic import AnalyticSimulator
 
 LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
 LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
-THRESHOLDS = ("dead_zone", "saturation", "speed_limit")  # answer to single commands, not to their mean
 SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
 LEAST_SHARE = 0.01  # of what is explained already
 MOST_ASKED = 80.0  # nats that the share asks for, at most
@@ -177,8 +177,7 @@ class InnovationFitter(Fitter):
 
     def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
         """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
-        kinds = {name.partition("/")[2] for name in model.effects}
-        matters = self.data.has_means and not kinds.isdisjoint(THRESHOLDS)
+        matters = self.data.has_means and any(kind_of(name).threshold for name in model.effects)
         if matters == (levels.spread > 0.0):
             return levels
         return replace(levels, spread=1.0 if matters else 0.0)

@@ -13,10 +13,9 @@ import numpy as np
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.observer import NoiseLevels
+from wipx.effects.catalogue import kind_of
 
-NON_SMOOTH = ("backlash",)
-DELAY, LATE = "actuator/delay", "actuator/backlash.contact_time"
-RIDGE = ("gap", "drive_inertia", "drive_damping")  # a wide gap before a light drive is crossed as a narrow one
+DELAY = "actuator/delay"
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
 ALONG = 2.0  # times that, along the ridge
 LONGEST = 0.04  # [s] of a delay that is guessed closely; longer ones must show from afar
@@ -35,20 +34,26 @@ MOST = 80.0  # nats of it
 def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
     """Whether what the laws of a fit follow roughly only may look like further effects.
 
-    It looks like others of the drive. A delay is none of them: flanks that give way are late themselves.
+    It looks like others at the same site, but for those whose place these laws can take themselves.
     """
-    return is_non_smooth(fit) and any(effect.startswith("actuator/") and effect != DELAY for effect in added)
+    for name in fit.effects:
+        if kind_of(name).non_smooth:
+            beside = [effect for effect in added if effect.partition("/")[0] == name.partition("/")[0]]
+            if not set(beside) <= set(_imitating(name).values()):
+                return True
+    return False
 
 
 def beside(fit: Fit, effect: str) -> list[dict[str, float]]:
     """Values of a fit beside which a further effect is tried: its own, and those that do without what hides it."""
     values = fit.hypothesis.values
-    return [values, {**values, LATE: 0.0}] if hides(fit, effect) else [values]
+    late = _hiding(fit, effect)
+    return [values, {**values, **dict.fromkeys(late, 0.0)}] if late else [values]
 
 
 def hides(fit: Fit, effect: str) -> bool:
-    """Whether slopes do not show what an effect would explain: late flanks have the place of a delay."""
-    return effect == DELAY and LATE in fit.hypothesis.values
+    """Whether slopes do not show what an effect would explain, since a rough one has its place."""
+    return bool(_hiding(fit, effect))
 
 
 def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
@@ -69,7 +74,7 @@ def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypot
 
 def is_non_smooth(fit: Fit) -> bool:
     """Whether a fit has an effect that makes the likelihood rough."""
-    return any(effect.partition("/")[2] in NON_SMOOTH for effect in fit.effects)
+    return any(kind_of(effect).non_smooth for effect in fit.effects)
 
 
 def searched_by_trial(fitter: Fitter, fit: Fit) -> Fit:
@@ -122,9 +127,24 @@ def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
 def _numbers(fit: Fit) -> tuple[list[int], list[int], np.ndarray]:
     """Indices of the rough effects' numbers, of those along the ridge, and the powers with which these change there."""
     names = fit.hypothesis.space.names
-    rough = [i for e in fit.effects if e.partition("/")[2] in NON_SMOOTH for i in fit.hypothesis.parameters_of(e)]
-    ridge = [i for i in rough if names[i].rpartition(".")[2] in RIDGE]
-    return rough, ridge, np.array([1.0 if names[i].endswith(f".{RIDGE[0]}") else -1.0 for i in ridge])
+    laws = {effect: law for effect in fit.effects if (law := kind_of(effect).non_smooth) is not None}
+    rough = [i for effect in laws for i in fit.hypothesis.parameters_of(effect)]
+    powers = {f"{effect}.{symbol}": power for effect, law in laws.items() for symbol, power in law.ridge.items()}
+    ridge = [i for i in rough if names[i] in powers]
+    return rough, ridge, np.array([powers[names[i]] for i in ridge])
+
+
+def _hiding(fit: Fit, effect: str) -> list[str]:
+    """Numbers of a fit's rough effects that can take the place of an effect."""
+    found = [number for name in fit.effects for number, kind in _imitating(name).items() if kind == effect]
+    return [number for number in found if number in fit.hypothesis.values]
+
+
+def _imitating(name: str) -> dict[str, str]:
+    """Effects whose place the numbers of one can take, by number."""
+    law = kind_of(name).non_smooth
+    site = name.partition("/")[0]
+    return {f"{name}.{symbol}": f"{site}/{kind}" for symbol, kind in law.imitates.items()} if law else {}
 
 
 def _costs(fitter: Fitter, fit: Fit, cubes: np.ndarray) -> np.ndarray:

@@ -1,4 +1,10 @@
-"""Laws that contain simpler ones: when a rich law was fitted but only its simple part is needed."""
+"""Laws that contain simpler ones: when a rich law was fitted but only its simple part is needed.
+
+Which law contains which, and when it amounts to it, the effects say themselves (`wipx.core.effect.Effect`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -6,65 +12,119 @@ from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance
-from wipx.effects.catalogue import effect_of, vocabulary
+from wipx.effects.catalogue import effect_of, kind_of, kinds, vocabulary
 from wipx.identify.noise import quantisation, sensor_noise
 
-CONTAINS = {  # rich law: the simple one that it can always imitate
-    "stribeck": "coulomb",
-    "presliding": "coulomb",
-    "sticky_spot": "coulomb",
-    "speed_limit": "saturation",
-    "payload_event": "payload",
-}
-# What an effect is whose memory is never tried: a bristle that does not slip is a spring, with its damping.
-PARTS = {"translation/presliding": {"environment/spring.k": "stiffness", "translation/viscous.sigma": "damping"}}
-CONTAINED_IN = {"presliding": "hysteresis"}  # law of the vocabulary: a richer one from beyond it
-SHAPES = ({"n": 2.0}, {"n": 2.0, "gamma": 0.4}, {"n": 2.0, "gamma": -0.4})  # of hysteresis, to start from
-SYMBOLS = {"F_stall": "F_max"}  # of the rich law whose number has another symbol in the simple one
-INVISIBLE = 0.3  # of a sensor's resolution, a deflection that cannot be seen
-HARDLY = 0.1  # of a joint's travel, bent by which a bristle hardly slips
-BEYOND_REACH = 3.0  # times the largest speed, a limit that is never felt
-CERTAIN_PEAK = 2.0  # standard deviations
-ALL_OVER = 0.9  # share of the travel from which a spot is the whole rail
+SPEED_OVER = 0.05  # [s] over which a speed is measured
+
+
+@dataclass(frozen=True)
+class FittedAt:
+    """An effect of a fit, and what the recordings show of its joint (a `wipx.core.effect.FittedEffect`).
+
+    Attributes:
+        effect: "site/kind".
+        fit: With the effect.
+        data: The recordings.
+    """
+
+    effect: str
+    fit: Fit
+    data: RecordingBatch
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Its numbers by symbol [SI]."""
+        prefix = f"{self.effect}."
+        return {n.removeprefix(prefix): v for n, v in self.fit.hypothesis.values.items() if n.startswith(prefix)}
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Coordinate of the joint in every row, shape (N,) [m or rad]."""
+        return self.data.measured[:, self._joint][self.data.rows]
+
+    @property
+    def resolution(self) -> float:
+        """Smallest deflection of the joint that its sensor shows [m or rad]."""
+        series = [r[self._coordinate] for r in self.data.recordings]
+        return max(quantisation(series), float(sensor_noise(self.data.recordings, self.data.plant)[self._joint]))
+
+    @property
+    def top_speed(self) -> float:
+        """Largest speed of the joint [m/s or rad/s]."""
+        speeds = []
+        for r in self.data.recordings:
+            q = r[self._coordinate]
+            step = max(1, min(round(SPEED_OVER * r.rate), len(q) - 1))
+            speeds.append(np.abs((q[step:] - q[:-step]) / (r.t[step:] - r.t[:-step])).max())
+        return float(max(speeds))
+
+    @property
+    def latest_start(self) -> float:
+        """When the last of the recordings starts [s]."""
+        return float(self.data.inputs.t[0].max())
+
+    def deviation(self, weights: Mapping[str, float]) -> float:
+        """Standard deviation of a weighted sum of its numbers [SI]."""
+        space = self.fit.hypothesis.space
+        slope = np.zeros(len(space.free))
+        for symbol, weight in weights.items():
+            i = space.names.index(f"{self.effect}.{symbol}")
+            slope[i] = weight * (space.free[i].high - space.free[i].low)
+        return float(np.sqrt(slope @ covariance(self.fit) @ slope))
+
+    @property
+    def _joint(self) -> int:
+        plant = self.data.plant
+        return plant.joints.index(plant.joint_at(self.effect.partition("/")[0]))
+
+    @property
+    def _coordinate(self) -> str:
+        return self.data.plant.coordinates[self._joint]
+
+
+def simple_law(effect: str) -> str | None:
+    """The simple law that an effect contains; None where it contains none."""
+    contains = kind_of(effect).contains
+    return f"{effect.partition('/')[0]}/{contains.kind}" if contains else None
+
+
+def comes_to_rest(effect: str) -> bool:
+    """Whether an effect may gain beyond the simple law in it by how a joint comes to rest."""
+    contains = kind_of(effect).contains
+    return contains is not None and contains.comes_to_rest
 
 
 def reduced_effects(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
     """The effects of a fit with one law replaced by the simpler one that it amounts to; None where it does not."""
     for effect in fit.effects:
-        kind = _amounts_to(effect, fit, data)
-        if kind is not None:
-            other = f"{effect.partition('/')[0]}/{kind}"
-            rest = tuple(other if e == effect else e for e in fit.effects)
-            if len(set(rest)) == len(rest):
-                return rest
+        simple, contains = simple_law(effect), kind_of(effect).contains
+        if simple and contains and simple not in fit.effects and contains.when(FittedAt(effect, fit, data)):
+            return tuple(simple if e == effect else e for e in fit.effects)
     return None
 
 
 def reduced_law(effect: str, beside: tuple[str, ...], plant: Plant) -> str | None:
     """The simple law that an effect contains; None where it contains none, or none that may stand beside the others."""
-    site, _, kind = effect.partition("/")
-    simple = f"{site}/{CONTAINS[kind]}" if kind in CONTAINS else None
+    simple = simple_law(effect)
+    if simple is None:
+        return None
+    site, _, kind = simple.partition("/")
     here = [e for e in beside if e.startswith(f"{site}/")]
-    excluded = simple in beside or any(CONTAINS.get(kind) in effect_of(e, plant).excludes for e in here)
+    excluded = simple in beside or any(kind in effect_of(e, plant).excludes for e in here)
     return None if excluded else simple
 
 
 def effects_in_parts(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
     """The effects of a fit with one in its parts, the parts last; None where no effect has any."""
-    plant = fit.hypothesis.model.plant
+    known = vocabulary(fit.hypothesis.model.plant)
     for effect in fit.effects:
-        parts = [name.partition(".")[0] for name in PARTS.get(effect, ())]
+        parts = [name.partition(".")[0] for name in _numbers_of_parts(effect)]
         rest = tuple(e for e in fit.effects if e != effect and e not in parts)
-        if parts and all(part in vocabulary(plant) for part in parts) and _hardly_slips(effect, fit, data):
+        made_of = kind_of(effect).made_of
+        if parts and made_of and all(part in known for part in parts) and made_of.when(FittedAt(effect, fit, data)):
             return (*rest, *parts)
     return None
-
-
-def _hardly_slips(effect: str, fit: Fit, data: RecordingBatch) -> bool:
-    """Whether a bristle bends by a good part of what its joint travels before it slips."""
-    value = fit.hypothesis.values
-    travel = float(np.ptp(data.measured[:, data.plant.joints.index(effect.partition("/")[0])][data.rows]))
-    return value[f"{effect}.F_c"] > HARDLY * travel * value[f"{effect}.stiffness"]
 
 
 def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
@@ -73,13 +133,15 @@ def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[
     With values to start from; None where no such law is known.
     """
     site, _, kind = effect.partition("/")
-    if kind not in CONTAINED_IN:
-        return None
-    law = f"{site}/{CONTAINED_IN[kind]}"
-    values = fit.hypothesis.values
-    kept = {name.replace(effect, law): value for name, value in values.items() if name.startswith(f"{effect}.")}
-    starts = [{**values, **kept, **{f"{law}.{symbol}": value for symbol, value in shape.items()}} for shape in SHAPES]
-    return (*(e for e in fit.effects if e != effect), law), starts
+    for extended in kinds().values():
+        extends = extended.extends
+        if extends is not None and extends.kind == kind:
+            law = f"{site}/{extended.kind}"
+            values = fit.hypothesis.values
+            kept = {n.replace(effect, law): value for n, value in values.items() if n.startswith(f"{effect}.")}
+            starts = [{**values, **kept, **{f"{law}.{s}": v for s, v in start.items()}} for start in extends.starts]
+            return (*(e for e in fit.effects if e != effect), law), starts
+    return None
 
 
 def reduced_values(fit: Fit) -> dict[str, float]:
@@ -87,56 +149,16 @@ def reduced_values(fit: Fit) -> dict[str, float]:
     found = {}
     for name, value in fit.hypothesis.values.items():
         effect, _, symbol = name.rpartition(".")
-        site, _, kind = effect.partition("/")
-        if kind in CONTAINS:
-            found[f"{site}/{CONTAINS[kind]}.{SYMBOLS.get(symbol, symbol)}"] = value
-    for effect, parts in PARTS.items():
-        if effect in fit.effects:
-            found.update({name: fit.hypothesis.values[f"{effect}.{symbol}"] for name, symbol in parts.items()})
+        contains = kind_of(effect).contains if effect else None
+        if contains is not None:
+            found[f"{simple_law(effect)}.{contains.symbols.get(symbol, symbol)}"] = value
+    for effect in fit.effects:
+        for number, symbol in _numbers_of_parts(effect).items():
+            found[number] = fit.hypothesis.values[f"{effect}.{symbol}"]
     return found
 
 
-def _amounts_to(effect: str, fit: Fit, data: RecordingBatch) -> str | None:
-    site, _, kind = effect.partition("/")
-    value = {name.rpartition(".")[2]: v for name, v in fit.hypothesis.values.items() if name.startswith(f"{effect}.")}
-    if kind == "presliding":
-        visible = INVISIBLE * _resolution(site, data)
-        return "coulomb" if value["F_c"] < visible * value["stiffness"] else None
-    if kind == "stribeck":
-        return "coulomb" if not _peak_is_certain(effect, fit, data) else None
-    if kind == "speed_limit":
-        return "saturation" if value["v_free"] > BEYOND_REACH * _top_speed(data) else None
-    if kind == "payload_event":
-        return "payload" if value["t0"] <= float(data.inputs.t[0].max()) + 0.15 else None
-    if kind == "sticky_spot":
-        travel = data.measured[:, 0][data.rows]
-        inside = np.mean((travel >= value["lo"]) & (travel <= value["hi"]))
-        return "coulomb" if inside > ALL_OVER else None
-    return None
-
-
-def _resolution(site: str, data: RecordingBatch) -> float:
-    joint = data.plant.joints.index(site)
-    series = [r[data.plant.coordinates[joint]] for r in data.recordings]
-    return max(quantisation(series), float(sensor_noise(data.recordings, data.plant)[joint]))
-
-
-def _peak_is_certain(effect: str, fit: Fit, data: RecordingBatch) -> bool:
-    """Whether static and Coulomb level differ by more than chance."""
-    space, cube = fit.hypothesis.space, fit.hypothesis.cube
-    static, level = space.names.index(f"{effect}.F_s"), space.names.index(f"{effect}.F_c")
-    size = np.array([p.high - p.low for p in space.free])
-    slope = np.zeros(len(cube))
-    slope[[static, level]] = size[static], -size[level]
-    peak = float(slope @ cube)
-    return peak > CERTAIN_PEAK * float(np.sqrt(slope @ covariance(fit) @ slope))
-
-
-def _top_speed(data: RecordingBatch) -> float:
-    joint = data.plant.joints.index(data.plant.actuated[0])
-    speeds = []
-    for r in data.recordings:
-        q = r[data.plant.coordinates[joint]]
-        step = max(1, min(round(0.05 * r.rate), len(q) - 1))
-        speeds.append(np.abs((q[step:] - q[:-step]) / (r.t[step:] - r.t[:-step])).max())
-    return float(max(speeds))
+def _numbers_of_parts(effect: str) -> Mapping[str, str]:
+    """Symbols of an effect by the numbers of its parts that they are; empty where it has none."""
+    site, made_of = effect.partition("/")[0], kind_of(effect).made_of
+    return made_of.numbers if made_of is not None and made_of.site == site else {}

@@ -12,12 +12,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wipx.core.diagnosis import ConsideredEffect
-from wipx.diagnosis.candidates.screening import SCANS, Candidate, candidates_beside, candidates_of_effect, unscaled
+from wipx.diagnosis.candidates.screening import Candidate, candidates_beside, candidates_of_effect, unscaled
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.sandwich import inflation
-from wipx.diagnosis.selection.nested_laws import effects_in_parts, reduced_effects, reduced_law, reduced_values
+from wipx.diagnosis.selection.nested_laws import (
+    comes_to_rest,
+    effects_in_parts,
+    reduced_effects,
+    reduced_law,
+    reduced_values,
+)
+from wipx.effects.catalogue import kind_of
 
 MOST_EFFECTS = 8
 LEAST_SHARE = 0.01  # of what is explained already
@@ -190,9 +197,7 @@ class Selection:
         if moved is not fit:
             found.append(self.fitter.converged(moved))
         if len(fit.effects) > 1:
-            found += [
-                self._restarted_without(fit, effect) for effect in fit.effects if effect.partition("/")[2] in SCANS
-            ]
+            found += [self._restarted_without(fit, effect) for effect in fit.effects if kind_of(effect).scan]
         again = max(found, key=lambda each: each.log_likelihood)
         if again.log_likelihood < fit.log_likelihood + 1.0:
             return fit
@@ -305,7 +310,7 @@ class Selection:
 
     def _tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
         """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""
-        rests = any(effect.endswith("/presliding") for effect in best.effects if effect not in simple)
+        rests = any(comes_to_rest(effect) for effect in best.effects if effect not in simple)
         return max(4.0, (STICKING_SHARE if rests else LEAST_SHARE) * self.evidence(self.nominal, best))
 
     def _extended(self, fit: Fit) -> list[Fit]:
@@ -342,7 +347,7 @@ class Selection:
             count = nonsmooth_search.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)
         fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
-        if starts[0].effect.partition("/")[2] in nonsmooth_search.NON_SMOOTH:
+        if kind_of(starts[0].effect).non_smooth:
             fits = [nonsmooth_search.searched_by_trial(self.fitter, found) for found in fits]
         return max(fits, key=lambda f: f.log_likelihood)
 

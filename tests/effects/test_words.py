@@ -3,8 +3,8 @@
 import pytest
 
 from wipx.core.plant import PLANTS
-from wipx.core.words import effect_in_words, has_words, site_in_words
-from wipx.effects.catalogue import kinds, vocabulary
+from wipx.effects.catalogue import vocabulary
+from wipx.effects.words import effect_in_words, site_in_words
 
 
 def test_words_name_the_physics_and_the_place():
@@ -16,11 +16,6 @@ def test_words_name_the_physics_and_the_place():
 def test_several_effects_are_joined_by_and():
     words = effect_in_words("pitch/viscous + actuator/delay", "pendulum")
     assert words == "viscous friction on the pendulum's joint and delay of the actuator"
-
-
-@pytest.mark.parametrize("kind", kinds())
-def test_every_kind_of_effect_has_words(kind: str):
-    assert has_words(kind)
 
 
 @pytest.mark.parametrize("plant", PLANTS.values(), ids=list(PLANTS))

@@ -1,0 +1,56 @@
+"""Effects and sites in plain words, for sentences, tables and pages.
+
+Words begin in lower case (but for names such as Coulomb), so that they fit into a sentence.
+"""
+
+from types import MappingProxyType
+
+from wipx.effects.catalogue import kinds
+
+_PLACES = MappingProxyType(
+    {
+        "translation": "the rail joint",
+        "pitch": "the pitch joint",
+        "joint1": "joint 1",
+        "joint2": "joint 2",
+        "actuator": "the actuator",
+        "geometry": "the masses and lengths",
+        "environment": "the environment",
+        "sensor_x": "the position sensor",
+        "sensor_theta": "the pitch sensor",
+        "sensor_theta1": "the sensor of joint 1",
+        "sensor_theta2": "the sensor of joint 2",
+    }
+)
+_PLACES_OF_PLANT = MappingProxyType(
+    {
+        ("cartpole", "translation"): "the cart's rail",
+        ("cartpole", "pitch"): "the pole's joint",
+        ("pendulum", "pitch"): "the pendulum's joint",
+        ("pendulum", "sensor_theta"): "the angle sensor",
+        ("linear_axis", "translation"): "the axis's rail",
+    }
+)
+
+
+def site_in_words(site: str, plant_kind: str) -> str:
+    """A site of a plant, e.g. "the rail joint" for "translation" of a wip."""
+    return _PLACES_OF_PLANT.get((plant_kind, site), _PLACES.get(site, site.replace("_", " ")))
+
+
+def effect_in_words(name: str, plant_kind: str) -> str:
+    """An effect "site/kind" of a plant, e.g. "Coulomb friction on the rail joint".
+
+    Several effects, joined by " + ", become "... and ...". An unknown kind and a name that is no "site/kind" are
+    kept.
+    """
+    return " and ".join(_one_effect(part.strip(), plant_kind) for part in name.split("+"))
+
+
+def _one_effect(name: str, plant_kind: str) -> str:
+    site, _, kind = name.partition("/")
+    if not kind:
+        return name
+    effect = kinds().get(kind)
+    words = effect.words if effect else f"{kind.replace('_', ' ')} of {{place}}"
+    return words.format(place=site_in_words(site, plant_kind))
