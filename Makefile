@@ -91,7 +91,7 @@ check: $(READY)  ## lint, formatting and types
 	$(PY) -m pyright
 
 docs: $(READY)  ## build the site into runs/docs; open runs/docs/index.html
-	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
 
 bench: $(READY)  ## measure speed and memory
 	$(PY) benchmarks/run.py

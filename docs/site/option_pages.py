@@ -98,11 +98,12 @@ def _settings(
             default = item.default_factory() if item.default_factory is not MISSING else item.default
             value = content.get(item.name, default)
             name = f"{prefix}{item.name}"
-            if is_dataclass(item.type) and isinstance(value, dict):
+            if isinstance(item.type, type) and is_dataclass(item.type) and isinstance(value, dict):
                 rows += _settings(item.type, value, {}, f"{name}.")
                 continue
             shown = "" if value is MISSING else _short(value)
-            said = meaning.get(item.name, ""), comments.get(item.name, "")
+            note = item.metadata.get("note")  # of a rule of the diagnosis
+            said = note.meaning if note else meaning.get(item.name, ""), comments.get(item.name, "")
             rows.append((f"`{name}`", shown, f"`{_kind(item.type)}`", *said))
     return rows
 
