@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check bench lock clean
+.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -90,12 +90,15 @@ check: $(READY)  ## lint, formatting and types
 	$(PY) -m ruff format --check
 	$(PY) -m pyright
 
+docs: $(READY)  ## build the site into runs/docs; open runs/docs/index.html
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
+
 bench: $(READY)  ## measure speed and memory
 	$(PY) benchmarks/run.py
 
 # Pins for every Python from 3.11 on and every platform; kept where they still fit, `UPGRADE=--upgrade` renews them.
 lock: $(READY)  ## renew requirements.lock after a change of pyproject.toml
-	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra rivals $(UPGRADE) \
+	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra rivals --extra docs $(UPGRADE) \
 		--no-emit-index-url --no-emit-find-links --no-annotate --no-header --output-file requirements.lock pyproject.toml
 
 clean:  ## remove runs/, caches and .venv

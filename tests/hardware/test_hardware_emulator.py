@@ -171,7 +171,7 @@ def test_hardware_that_dies_ends_the_trials_with_one_line_and_what_was_recorded_
     with pytest.raises(InputError, match=f"trial second: stopped: .*{reason}") as caught:
         next(running)
     assert "\n" not in str(caught.value)
-    assert "the motor has not confirmed to be off" in capsys.readouterr().err
+    assert "the motor has not confirmed that it is off" in capsys.readouterr().err
 
 
 @real_time

@@ -214,5 +214,7 @@ def test_recordings_with_loads_are_not_taken_for_those_of_one_robot(loaded: Path
 
 def test_a_load_without_any_recording_is_named(loaded: Path):
     (loaded / "heavy_1.csv").unlink()
-    with pytest.raises(InputError, match=r"loads: heavy: heavy_\* matches none of the recordings; mend the pattern$"):
+    with pytest.raises(
+        InputError, match=r"loads: heavy: heavy_\* matches none of the recordings; correct the pattern$"
+    ):
         RecordingSource(path=str(loaded)).load()

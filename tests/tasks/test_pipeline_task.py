@@ -61,7 +61,7 @@ def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(prog
     assert again.out == answer.out
     other = program("task=pipeline", *SHORT, "seed=5", "hydra.run.dir=out")
     assert other.status == 2
-    assert "begun by another command" in other.error
+    assert "made by another command" in other.error
 
 
 @pytest.mark.parametrize(
