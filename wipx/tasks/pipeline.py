@@ -103,7 +103,8 @@ class Pipeline:
         trials = [self._trial(k, name, nominal, rng) for k, name in enumerate(names)]
         with written_together(job.out) as folder:
             (folder / "recordings").mkdir()
-            write_robot(folder / "recordings" / "robot.yaml", nominal, controller, {})
+            feedback = controller.feedback(nominal), controller.rate
+            write_robot(folder / "recordings" / "robot.yaml", nominal, feedback, {})
             runs = target.run(trials, controller.loop(nominal), rng)
             for recording in tqdm(runs, desc="record", total=len(trials), leave=False, disable=None):
                 slow = logged_slower(recording, self.log_every)
