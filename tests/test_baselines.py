@@ -1,4 +1,4 @@
-"""Rivals on pendulums that hang and are driven by sums of sines: stable, so that no controller is needed."""
+"""Baselines on pendulums that hang and are driven by sums of sines: stable, so that no controller is needed."""
 
 import importlib
 import json
@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from wipx.baselines.all_at_once import AllAtOnce
-from wipx.baselines.case import Problem, Rival
+from wipx.baselines.case import Baseline, Problem
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.baselines.motion import motions
 from wipx.baselines.network import ResidualAcceleration, read_network
@@ -71,7 +71,7 @@ def case(effects: Effects, rng: np.random.Generator, noise: float = NOISE) -> Pr
 @pytest.mark.parametrize(
     "effects", [COULOMB, pytest.param(VISCOUS, marks=pytest.mark.slow)], ids=["coulomb", "viscous"]
 )
-def test_a_rival_finds_clear_friction_and_predicts_better(name: str, effects: Effects, fresh_seed: int):
+def test_a_baseline_finds_clear_friction_and_predicts_better(name: str, effects: Effects, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     given = case(effects, rng)
     answer = NAMING[name].answer(given, rng)
@@ -207,7 +207,7 @@ def test_the_task_writes_what_the_contract_asks_for(tmp_path: Path, monkeypatch:
         folder(tmp_path / "unseen", COULOMB, rng),
         tmp_path / "out",
     )
-    assert run(monkeypatch, "task=rival", f"recordings.path={seen}", f"hydra.run.dir={out}") == 0
+    assert run(monkeypatch, "task=baseline", f"recordings.path={seen}", f"hydra.run.dir={out}") == 0
     content = json.loads((out / "diagnosis.json").read_text())
     assert content["verdict"] == "mismatch"
     assert sum(content["location"]["sites"].values()) == pytest.approx(1.0)
@@ -226,9 +226,8 @@ def test_the_task_leaves_a_network_that_a_prediction_adds(
     pytest.importorskip("torch")
     rng = np.random.default_rng(fresh_seed)
     seen, out = folder(tmp_path / "seen", VISCOUS, rng), tmp_path / "out"
-    assert (
-        run(monkeypatch, "task=rival", "rival=residual_network", f"recordings.path={seen}", f"hydra.run.dir={out}") == 0
-    )
+    learn = ("task=baseline", "baseline=residual_network", f"recordings.path={seen}", f"hydra.run.dir={out}")
+    assert run(monkeypatch, *learn) == 0
     predict = ["task=predict", f"recordings.path={seen}", f"task.residual={out / 'residual.npz'}"]
     assert run(monkeypatch, *predict, f"hydra.run.dir={tmp_path / 'p'}") == 0
     metrics = json.loads((tmp_path / "p" / "metrics.json").read_text())
@@ -238,9 +237,9 @@ def test_the_task_leaves_a_network_that_a_prediction_adds(
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("rival=guesswork", "rival: unknown option 'guesswork'"),
-        ("rival.seconds=0", "seconds is 0, expected a positive number"),
-        ("rival.population=3", "rival: unknown key 'population'"),
+        ("baseline=guesswork", "baseline: unknown option 'guesswork'"),
+        ("baseline.seconds=0", "seconds is 0, expected a positive number"),
+        ("baseline.population=3", "baseline: unknown key 'population'"),
     ],
 )
 def test_a_wrong_setting_gets_one_line(
@@ -248,13 +247,13 @@ def test_a_wrong_setting_gets_one_line(
 ):
     seen = folder(tmp_path / "seen", {}, np.random.default_rng(0))
     out = tmp_path / "out"
-    assert run(monkeypatch, "task=rival", setting, f"recordings.path={seen}", f"hydra.run.dir={out}") == 2
+    assert run(monkeypatch, "task=baseline", setting, f"recordings.path={seen}", f"hydra.run.dir={out}") == 2
     error = capsys.readouterr().err
     assert message in error
     assert len(error.strip().splitlines()) == 1
     assert not out.exists()
 
 
-def test_every_rival_keeps_to_the_protocol():
-    rivals: list[Rival] = [*NAMING.values(), ResidualNetwork()]
-    assert all(rival.seconds > 0.0 for rival in rivals)
+def test_every_baseline_keeps_to_the_protocol():
+    baselines: list[Baseline] = [*NAMING.values(), ResidualNetwork()]
+    assert all(baseline.seconds > 0.0 for baseline in baselines)

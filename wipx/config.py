@@ -53,7 +53,7 @@ class RunConfig:
         objective: The loss.
         target: The robot that is driven.
         controller: What drives it.
-        rival: What people would use in place of a diagnosis.
+        baseline: What people would use in place of a diagnosis.
         method: Which simulation a training set comes from.
         estimator: What estimates the equilibrium pitch.
         tracking: Where runs are logged.
@@ -75,7 +75,7 @@ class RunConfig:
     objective: Any = None
     target: Any = None
     controller: Any = None
-    rival: Any = None
+    baseline: Any = None
     method: Any = None
     estimator: Any = None
     tracking: Any = None

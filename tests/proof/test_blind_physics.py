@@ -1,4 +1,4 @@
-"""The concealed robots' own mechanics: energy, sticking, delay."""
+"""The blind benchmark's own mechanics: energy, sticking, delay."""
 
 import numpy as np
 import pytest
