@@ -64,6 +64,8 @@ def command_line(tmp_path: Path) -> CommandLine:
         ("~rival", "~baseline"),
         ("+task.rivals=[a]", "+task.baselines=[a]"),
         ("task=concealed", "task=blind"),
+        ("target.engine=analytic", "sim@target.engine=analytic"),
+        ("target.engine.step=1e-3", "target.engine.step=1e-3"),
         ("+experiment=concealed", "+experiment=blind"),
         ("arrival=1", "arrival=1"),
         ("task.rivalry=1", "task.rivalry=1"),

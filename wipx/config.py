@@ -162,7 +162,7 @@ def _target(path: object, where: str) -> type[Any]:
 
 
 def typed(value: object, kind: Any, where: str) -> Any:
-    """`value` as a field annotated `kind` takes it.
+    """`value` as a field annotated `kind` takes it; a field annotated with a class of this package holds a part.
 
     An integer is accepted where a float is expected and a list where a tuple is; a truth value is
     no number.
@@ -179,6 +179,8 @@ def typed(value: object, kind: Any, where: str) -> Any:
     """
     if kind is Any or kind is object:
         return value
+    if isinstance(kind, type) and kind.__module__.startswith(f"{PACKAGE}."):
+        return build(value, where)
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         return _member(value, kind, where)

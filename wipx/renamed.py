@@ -9,6 +9,8 @@ RENAMED = (
     (r"task=rival$", "task=baseline"),
     (r"task\.rivals(?==)", "task.baselines"),
     (r"task\.rivals_cases(?==)", "task.baselines_cases"),
+    (r"target\.engine(?==)", "sim@target.engine"),
+    (r"target\.step(?==)", "target.engine.step"),
     (r"task=concealed$", "task=blind"),
     (r"task=concealed_check$", "task=blind_check"),
     (r"experiment=concealed$", "experiment=blind"),

@@ -21,8 +21,8 @@ SHORT = (
     "task.per_load=1",
     "task.scenarios=[balancing]",
     "estimator.epochs=3",
-    "target.engine=analytic",
-    "target.step=5e-4",
+    "sim@target.engine=analytic",
+    "target.engine.step=5e-4",
 )
 
 

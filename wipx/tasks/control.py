@@ -101,7 +101,8 @@ class Control:
             if name not in target.loads:
                 raise unknown_name("load", name, target.loads, "task.loads")
         if isinstance(target, EmulatedTestbed):
-            return replace(target, rail=self._rail, step=self.step, weights=_placed(target.weights, scenario))
+            placed = replace(target, rail=self._rail, weights=_placed(target.weights, scenario))
+            return placed.stepping(self.step)
         if scenario.has_events or scenario.mirrored:
             raise InputError(
                 f"task.scenario={self.scenario} needs target=emulated; a robot can do balancing or tracking"

@@ -186,8 +186,8 @@ def _of_groups(overrides: tuple[str, ...], *groups: str) -> tuple[str, ...]:
 
 
 def _group_of(override: str) -> str:
-    """Group of an override such as `+controller.rate=500`."""
-    return override.lstrip("+~").partition("=")[0].partition(".")[0]
+    """Group of an override such as `+controller.rate=500`, or of a part within one, `sim@target.engine=analytic`."""
+    return override.lstrip("+~").partition("=")[0].rpartition("@")[2].partition(".")[0]
 
 
 def logged_slower(recording: Recording, every: int) -> Recording:
