@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bare_robots import BODIES, open_loop
+from proof.blind_robots.bare_robots import BODIES, open_loop
 
 from wipx.proof.blind_robots.physics import Hidden, Oddity
 
