@@ -80,7 +80,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 test: $(READY)  ## run the tests (without the slow ones)
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow"
 
-test-fresh: $(READY)  ## run the tests with random numbers that no run had (SEED=N: those of an earlier one)
+test-fresh: $(READY)  ## run the tests on fresh random numbers, statistical claims ten times (SEED=N: those of an earlier run)
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow" --seed=$(or $(SEED),fresh)
 
 test-slow: $(READY)  ## run the slow tests
