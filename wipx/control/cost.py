@@ -21,7 +21,7 @@ class QuadraticCost(Controller):
         command: Diagonal of R.
         rate: Of the controller [Hz].
         limit: Largest command [N or N m].
-        noise: Standard deviations of `FilterNoise` that replace the usual ones in the state estimate of `loop`, by name.
+        noise: Standard deviations of `FilterNoise` that replace the usual ones in the estimate of `loop`, by name.
     """
 
     coordinates: tuple[float, ...] = (20.0, 100.0)

@@ -43,7 +43,7 @@ class Pid(Controller):
         lean: Largest pitch that position may ask for; the integral does not grow beyond it [rad].
         rate: Of the controller [Hz].
         limit: Largest command [N].
-        noise: Standard deviations of `FilterNoise` that replace the usual ones in the state estimate of `loop`, by name.
+        noise: Standard deviations of `FilterNoise` that replace the usual ones in the estimate of `loop`, by name.
     """
 
     pitch_bandwidth: float = 1.0
