@@ -17,7 +17,7 @@ LAYERS = (
     {"library"},
     {"tasks"},
     {"proof"},
-    {"config"},
+    {"config", "renamed"},
     {"app"},
     {"__main__"},
 )

@@ -54,7 +54,7 @@ class RunConfig:
         objective: The loss.
         target: The robot that is driven.
         controller: What drives it.
-        rival: What people would use in place of a diagnosis.
+        baseline: What people would use in place of a diagnosis.
         method: Which simulation a training set comes from.
         estimator: What estimates the equilibrium pitch.
         tracking: Where runs are logged.
@@ -77,7 +77,7 @@ class RunConfig:
     objective: Any = None
     target: Any = None
     controller: Any = None
-    rival: Any = None
+    baseline: Any = None
     method: Any = None
     estimator: Any = None
     tracking: Any = None
@@ -167,8 +167,15 @@ def _target(path: object, where: str) -> type[Any]:
     return target
 
 
+def _part(kind: type[Any], value: object, where: str) -> Any:
+    """A part of a part: the class that the value names, or else a dataclass with the settings that it lists."""
+    if is_dataclass(kind) and isinstance(value, Mapping) and "_target_" not in value:
+        return _filled(kind, value, where)
+    return build(value, where)
+
+
 def typed(value: object, kind: Any, where: str) -> Any:
-    """`value` as a field annotated `kind` takes it.
+    """`value` as a field annotated `kind` takes it; a field annotated with a class of this package holds a part.
 
     An integer is accepted where a float is expected and a list where a tuple is; a truth value is
     no number.
@@ -185,8 +192,8 @@ def typed(value: object, kind: Any, where: str) -> Any:
     """
     if kind is Any or kind is object:
         return value
-    if is_dataclass(kind) and isinstance(kind, type) and isinstance(value, Mapping):
-        return _filled(kind, value, where)
+    if isinstance(kind, type) and kind.__module__.startswith(f"{PACKAGE}."):
+        return _part(kind, value, where)
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         return _member(value, kind, where)

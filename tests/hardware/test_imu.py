@@ -159,7 +159,7 @@ def test_the_emulated_sensor_does_what_the_driver_asks_of_it():
 
     for message, parser in (("binary", BinaryParser()), ("text", TextParser())):
         port, opened = Port(), ImuSettings("nowhere", message=message, rate=100)
-        imu = EmulatedImu(EmulatedRobot(WIP, QUIET, 0.1, 0.0), QUIET, np.random.default_rng(), 0.0)
+        imu = EmulatedImu(EmulatedRobot(WIP, QUIET, 0.1, 0.0), QUIET, np.random.default_rng(0), 0.0)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("serial.serial_for_url", lambda *_, port=port, **__: port)
             open_imu(opened)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -31,7 +30,13 @@ PITCHES = (-0.03, -0.06, -0.09, -0.12, -0.16)
 def shipped(option: str = "emulated") -> EmulatedTestbed:
     """The testbed of a configuration file, on the engine that is the fastest for one robot."""
     node = yaml.safe_load((configuration_folder() / "target" / f"{option}.yaml").read_text())
-    return replace(build(node, "target"), engine="analytic")
+    del node["defaults"]
+    return build({**node, "engine": engine_node("analytic")}, "target")
+
+
+def engine_node(option: str) -> dict[str, object]:
+    """An option of `sim`, with the step of the testbed."""
+    return {**yaml.safe_load((configuration_folder() / "sim" / f"{option}.yaml").read_text()), "step": 1e-4}
 
 
 BED = shipped()
@@ -223,7 +228,7 @@ def test_the_imu_errs_by_a_bias_and_wanders():
 @pytest.mark.parametrize("kind", ["cartpole", "linear_axis", "pendulum"])
 def test_other_plants_stand_on_the_testbed_too(kind: str):
     wheel = {} if kind == "pendulum" else {"wheel_radius": RADIUS}
-    bed = EmulatedTestbed(kind, {**PARAMETERS[kind], **wheel}, engine="analytic")
+    bed = EmulatedTestbed(kind, {**PARAMETERS[kind], **wheel}, engine=BED.engine)
     (run,) = record(bed, Trial("r.csv", 0.3, reference=excitation(3, plant_of(kind), np.random.default_rng(0))))
     plant = plant_of(kind)
     assert {"t", "u", *plant.coordinates, *plant.rates} <= set(run.columns)
@@ -231,10 +236,9 @@ def test_other_plants_stand_on_the_testbed_too(kind: str):
 
 
 @pytest.mark.parametrize("engine", [pytest.param("mujoco", marks=pytest.mark.slow), "pybullet"])
-def test_other_engines_move_the_same_robot(engine: Literal["mujoco", "pybullet"], heavy: Recording):
+def test_other_engines_move_the_same_robot(engine: str, heavy: Recording):
     pytest.importorskip(engine)
-    assert BED.step <= 1e-4
-    (run,) = record(replace(BED, engine=engine), Trial("b3_1.csv", 1.25, "b3"))
+    (run,) = record(replace(BED, engine=build(engine_node(engine), "sim")), Trial("b3_1.csv", 1.25, "b3"))
     for column, close in (("x", 2e-4), ("theta", 2e-4)):  # errors of the integrators, grown by the falling body
         np.testing.assert_allclose(run[column], heavy[column], rtol=0.0, atol=close)
 
@@ -242,7 +246,9 @@ def test_other_engines_move_the_same_robot(engine: Literal["mujoco", "pybullet"]
 def test_the_testbed_that_ships_is_another_engine_than_the_fitted_model():
     folder = configuration_folder()
     for option in ("emulated", "emulated_paper"):
-        assert yaml.safe_load((folder / "target" / f"{option}.yaml").read_text())["engine"] == "mujoco"
+        node = yaml.safe_load((folder / "target" / f"{option}.yaml").read_text())
+        assert node["defaults"][0] == {"/sim@engine": "mujoco"}
+        assert node["engine"]["step"] <= 1e-4
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_the_hook_notes_and_refuses(rules: Settings):
     watch("open", (3, "r", 0))  # a descriptor
     watch("open", (rules.allowed[0].encode(), "r", 0))
     for event, asked in (("open", f"{rules.guarded[0]}/a"), ("os.rename", f"{rules.guarded[0]}/a")):
-        with pytest.raises(PermissionError, match="sealed while physics is concealed"):
+        with pytest.raises(PermissionError, match="sealed while physics is hidden"):
             watch(event, (asked, "elsewhere", 0))
     with pytest.raises(PermissionError, match="without other processes"):
         watch("subprocess.Popen", ("cat", [], None, None))

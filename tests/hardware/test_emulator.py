@@ -90,7 +90,7 @@ def operator(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[str], None]
 
 
 def trials(emulated: Emulated, loop: Feedback, *plan: Trial) -> Iterator[Recording]:
-    return emulated.target.run(plan, loop, np.random.default_rng())
+    return emulated.target.run(plan, loop, np.random.default_rng(0))
 
 
 @real_time

@@ -1,4 +1,4 @@
-"""`+experiment=concealed` as a user meets it."""
+"""`+experiment=blind` as a user meets it."""
 
 import subprocess
 import sys
@@ -14,15 +14,15 @@ def wipx(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_help_names_the_experiment_and_its_profiles():
     text = wipx("--help").stdout
-    assert "python -m wipx +experiment=concealed" in text
+    assert "python -m wipx +experiment=blind" in text
     assert "profile: consistency_full, consistency_quick, full, quick" in text
 
 
 @pytest.mark.parametrize(("profile", "cases"), [("quick", 30), ("full", 300)])
 def test_one_switch_chooses_the_size(profile: str, cases: int):
-    task = yaml.safe_load(wipx("+experiment=concealed", f"profile={profile}", "--cfg", "job").stdout)["task"]
+    task = yaml.safe_load(wipx("+experiment=blind", f"profile={profile}", "--cfg", "job").stdout)["task"]
     assert task["cases"] == cases
-    assert 0 < task["rivals_cases"] < cases
+    assert 0 < task["baselines_cases"] < cases
 
 
 @pytest.mark.parametrize(("profile", "cases"), [("quick", 20), ("full", 200)])
@@ -30,13 +30,13 @@ def test_dirty_robots_are_an_experiment_of_their_own(profile: str, cases: int):
     task = yaml.safe_load(wipx("+experiment=dirty", f"profile={profile}", "--cfg", "job").stdout)["task"]
     assert task["cases"] == cases
     assert task["tiers"] == ["dirty", "dirt_only"]
-    assert 0 < task["rivals_cases"] < cases
+    assert 0 < task["baselines_cases"] < cases
 
 
 @pytest.mark.parametrize(
     ("argument", "message"),
     [
-        ("+experiment=conceald", "experiment: unknown option 'conceald'; did you mean concealed?"),
+        ("+experiment=blnd", "experiment: unknown option 'blnd'; did you mean blind?"),
         ("profile=ful", "profile: unknown option 'ful'; did you mean full?"),
         ("task.cases=0", "task.cases is 0, expected 1 or more"),
         ("task.lengths=[7,5]", "task.lengths is [7.0, 5.0], expected the shortest and the longest time of a recording"),
@@ -44,7 +44,7 @@ def test_dirty_robots_are_an_experiment_of_their_own(profile: str, cases: int):
     ],
 )
 def test_a_slip_is_one_line_and_status_2(argument: str, message: str, tmp_path):
-    chosen = () if argument.startswith("+experiment") else ("+experiment=concealed",)
+    chosen = () if argument.startswith("+experiment") else ("+experiment=blind",)
     done = wipx(*chosen, argument, f"hydra.run.dir='{tmp_path / 'out'}'")
     assert (done.returncode, done.stdout) == (2, "")
     assert message in done.stderr

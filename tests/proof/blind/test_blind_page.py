@@ -1,4 +1,4 @@
-"""The page of a concealed run says what was scored, at a glance and in full."""
+"""The page of a run of the blind benchmark says what was scored, at a glance and in full."""
 
 import json
 from dataclasses import replace
@@ -102,8 +102,8 @@ def test_what_was_refused_stands_on_the_page(folder: RunFolder):
 
 def test_methods_are_compared_on_the_same_cases(folder: RunFolder):
     assert score_page_of(folder, cases(), ACCOUNT).methods is None
-    rival = scored("case0002", "single_clear", "pitch/viscous", answer=("pitch/coulomb", "pitch/viscous"))
-    table = score_page_of(folder, cases(("regression", rival)), ACCOUNT).methods
+    baseline = scored("case0002", "single_clear", "pitch/viscous", answer=("pitch/coulomb", "pitch/viscous"))
+    table = score_page_of(folder, cases(("regression", baseline)), ACCOUNT).methods
     assert table is not None
     ours, theirs = (dict(zip(table.head, row, strict=True)) for row in table.rows)
     assert ours["names right"] == "1 of 1\n3 to 100 %"
@@ -120,8 +120,8 @@ def test_markdown_has_the_tables_with_links_or_without(folder: RunFolder):
 
 
 def test_hostile_texts_stay_text(folder: RunFolder):
-    rival = replace(SCORES[1], failure=HOSTILE)
-    page = score_page_of(folder, cases((HOSTILE, rival)), ACCOUNT)
+    baseline = replace(SCORES[1], failure=HOSTILE)
+    page = score_page_of(folder, cases((HOSTILE, baseline)), ACCOUNT)
     text = score_page(page)
     assert HOSTILE not in text
     assert HOSTILE in unescape(text)

@@ -352,7 +352,7 @@ def test_a_load_that_the_robot_lacks_is_refused_before_anything_is_opened(monkey
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     target = HardwareTarget(**settings(weights={"heavy": {"mass": 1.6, "height": 0.4, "side": -0.1}}))
     with pytest.raises(InputError, match=r"target\.weights: unknown load 'light'"):
-        next(target.run([Trial("r", 1.0, "light")], Feedback(BALANCING), np.random.default_rng()))
+        next(target.run([Trial("r", 1.0, "light")], Feedback(BALANCING), np.random.default_rng(0)))
 
 
 def test_loads_are_those_of_the_owner():
@@ -363,4 +363,4 @@ def test_loads_are_those_of_the_owner():
 def test_without_an_operator_nothing_is_started(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
     with pytest.raises(InputError, match="run it from a terminal"):
-        next(HardwareTarget(**settings()).run([Trial("r", 1.0)], Feedback(BALANCING), np.random.default_rng()))
+        next(HardwareTarget(**settings()).run([Trial("r", 1.0)], Feedback(BALANCING), np.random.default_rng(0)))

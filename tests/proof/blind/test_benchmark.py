@@ -1,4 +1,4 @@
-"""A whole concealed run, with a quick stand-in for the diagnosis: sealed, answered, opened, scored, checked."""
+"""A whole run of the blind benchmark, with a quick stand-in for the diagnosis: from the seals to the check."""
 
 import json
 import shutil
@@ -13,8 +13,8 @@ import pytest
 
 from wipx.core.errors import InputError
 from wipx.proof.blind import benchmark, diagnosing
-from wipx.proof.blind.benchmark import Concealed
-from wipx.proof.blind.check import ConcealedCheck
+from wipx.proof.blind.benchmark import BlindBenchmark
+from wipx.proof.blind.check import BlindCheck
 from wipx.proof.blind.diagnosing import OURS, Diagnosers, check_methods
 from wipx.proof.blind_robots.folder import RunFolder
 from wipx.recordings.model_file import write_model
@@ -28,7 +28,7 @@ CONSISTENT = {
     "location": {"sites": {}, "regions": [], "times": []},
 }
 SEED = 8  # draws robots that stay up at once
-TASK = Concealed(cases=2, seed=SEED, workers=1, tiers=("nothing",), rivals=("guess",), rivals_cases=1)
+TASK = BlindBenchmark(cases=2, seed=SEED, workers=1, tiers=("nothing",), baselines=("guess",), baselines_cases=1)
 
 
 def job(out: Path) -> Job:
@@ -48,13 +48,13 @@ def answered_nothing(self: Diagnosers, settings: str, arguments: list[str]) -> s
     recordings, out = (Path(text.partition("=")[2].strip("'")) for text in arguments[-2:])
     (out / "diagnosis.json").write_text(json.dumps(CONSISTENT))
     write_model(RecordingSource(path=str(recordings)).describe().model, out / "model.yaml")
-    return "exit status 2: cannot guess" if "rival=guess" in arguments else ""
+    return "exit status 2: cannot guess" if "baseline=guess" in arguments else ""
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a finished run of two cases; a rival gives no answer to one of them."""
-    out = tmp_path_factory.mktemp("concealed") / "run"
+    """The folder of a finished run of two cases; a baseline gives no answer to one of them."""
+    out = tmp_path_factory.mktemp("blind") / "run"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Diagnosers, "_watched", answered_nothing)
         TASK.run(job(out))
@@ -68,7 +68,7 @@ def copy(finished: Path, tmp_path: Path) -> RunFolder:
 
 
 def check(folder: RunFolder) -> None:
-    ConcealedCheck(str(folder.path)).run(job(folder.path.parent / "check"))
+    BlindCheck(str(folder.path)).run(job(folder.path.parent / "check"))
 
 
 def test_a_run_leaves_commitments_answers_and_a_page(finished: Path):
@@ -76,7 +76,7 @@ def test_a_run_leaves_commitments_answers_and_a_page(finished: Path):
     parts = {"commitments.json", "recordings", "sealed", "answers", "opened"}
     assert names == parts | {"index.html", "score.md", "score.csv", "score.json", "confusions.png"}
     page = (finished / "index.html").read_text()
-    assert "2 robots with concealed physics" in page
+    assert "2 robots with hidden physics" in page
     assert "cannot guess" in page
     summary = json.loads((finished / "score.json").read_text())
     assert summary["cases"]["case0001"][OURS]["exact"]
@@ -133,7 +133,7 @@ def test_a_changed_key_is_one_line_and_status_2(copy: RunFolder):
     content = json.loads(path.read_text())
     other = json.loads(copy.opened("case0002").read_text())
     path.write_text(json.dumps({**content, "key": other["key"]}))
-    command = [sys.executable, "-m", "wipx", "task=concealed_check", f"task.folder='{copy.path}'", "tracking=none"]
+    command = [sys.executable, "-m", "wipx", "task=blind_check", f"task.folder='{copy.path}'", "tracking=none"]
     out = f"hydra.run.dir='{copy.path.parent / 'check'}'"
     done = subprocess.run([*command, out], capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
@@ -162,7 +162,7 @@ def test_an_interrupted_run_goes_on_with_the_same_robots(copy: RunFolder, monkey
     with pytest.raises(KeyboardInterrupt):
         TASK.run(job(copy.path))
     assert stat.S_IMODE(copy.keys.stat().st_mode) == 0o600
-    assert "1 robot with concealed physics" in (copy.path / "index.html").read_text()
+    assert "1 robot with hidden physics" in (copy.path / "index.html").read_text()
     with pytest.raises(InputError, match="an unfinished run of other settings"):
         replace(TASK, cases=3).run(job(copy.path))
     with pytest.raises(InputError, match="not of seed 6"):
@@ -173,7 +173,7 @@ def test_an_interrupted_run_goes_on_with_the_same_robots(copy: RunFolder, monkey
     assert copy.commitments.read_bytes() == published
     assert not copy.keys.exists()
     page = (copy.path / "index.html").read_text()
-    assert "2 robots with concealed physics" in page
+    assert "2 robots with hidden physics" in page
     assert "interrupted 2 times;" in page
     check(copy)
 
@@ -182,13 +182,13 @@ class FreshRobotsError(Exception):
     pass
 
 
-def fresh(self: Concealed, folder: RunFolder) -> None:
+def fresh(self: BlindBenchmark, folder: RunFolder) -> None:
     raise FreshRobotsError
 
 
 def test_a_run_without_its_keys_is_set_aside_with_what_is_opened(copy: RunFolder, monkeypatch: pytest.MonkeyPatch):
     unopened(copy, "case0002")
-    monkeypatch.setattr(Concealed, "_drawn", fresh)
+    monkeypatch.setattr(BlindBenchmark, "_drawn", fresh)
     with pytest.raises(FreshRobotsError):
         TASK.run(job(copy.path))
     (earlier,) = (copy.path / "earlier").iterdir()
@@ -197,7 +197,7 @@ def test_a_run_without_its_keys_is_set_aside_with_what_is_opened(copy: RunFolder
 
 
 def test_a_finished_run_is_set_aside_for_fresh_robots(copy: RunFolder, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(Concealed, "_drawn", fresh)
+    monkeypatch.setattr(BlindBenchmark, "_drawn", fresh)
     with pytest.raises(FreshRobotsError):
         TASK.run(job(copy.path))
     (earlier,) = (copy.path / "earlier").iterdir()
@@ -205,7 +205,7 @@ def test_a_finished_run_is_set_aside_for_fresh_robots(copy: RunFolder, monkeypat
 
 
 def test_an_unknown_method_is_refused_before_robots_are_drawn():
-    with pytest.raises(InputError, match=r"task\.rivals: guess: .* unknown option"):
+    with pytest.raises(InputError, match=r"task\.baselines: guess: .* unknown option"):
         check_methods(("guess",))
 
 

@@ -1,8 +1,8 @@
-"""The concealed robots' own mechanics: energy, sticking, delay."""
+"""The blind benchmark's own mechanics: energy, sticking, delay."""
 
 import numpy as np
 import pytest
-from bare_robots import BODIES, open_loop
+from proof.blind_robots.bare_robots import BODIES, open_loop
 
 from wipx.proof.blind_robots.physics import Hidden, Oddity
 

@@ -24,7 +24,7 @@ from wipx.sim.mjcf import BUILT_IN, mjcf
 Effects = Mapping[str, Mapping[str, float]]
 
 SIMULATOR = AnalyticSimulator(threads=1)
-RIVAL = MujocoSysid(seconds=1.0, windows=12)
+BASELINE = MujocoSysid(seconds=1.0, windows=12)
 BODY = {"body_mass": 2.6, "wheel_mass": 1.2, "com_height": 0.35, "body_inertia": 0.11}
 LINKS = {
     f"link{i}_{n}": v for i in (1, 2) for n, v in (("mass", 0.5), ("length", 0.2), ("com", 0.15), ("inertia", 0.02))
@@ -110,7 +110,7 @@ def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: s
     effect, _, symbol = name.rpartition(".")
     true, nominal = robot(kind, {effect: {symbol: value}}), robot(kind, {})
     case = Problem(record(true, rng), nominal, {}, SIMULATOR)
-    answer = RIVAL.answer(case, rng)
+    answer = BASELINE.answer(case, rng)
     assert answer.mismatch
     found = {f.name: f for f in answer.found}
     assert max(found, key=lambda n: found[n].weight) == effect
@@ -123,7 +123,7 @@ def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: s
 def test_the_toolbox_finds_nothing_where_nothing_is_missing(mujoco: Any, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     model = robot("linear_axis", {})
-    answer = RIVAL.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
+    answer = BASELINE.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
     assert not answer.mismatch
     assert not answer.found
 
@@ -134,7 +134,7 @@ def test_an_uncertain_mass_is_corrected_and_not_named(mujoco: Any, fresh_seed: i
     true = robot("linear_axis", {"translation/viscous": {"sigma": 1.5}})
     heavier = replace(true, parameters={**true.parameters, "body_mass": 2.2})
     given = Problem(record(heavier, rng), robot("linear_axis", {}), {"body_mass": 0.1}, SIMULATOR)
-    answer = RIVAL.answer(given, rng)
+    answer = BASELINE.answer(given, rng)
     assert [f.name for f in answer.found] == ["translation/viscous"]
     assert answer.model.parameters["body_mass"] == pytest.approx(2.2, rel=0.03)
 
@@ -155,5 +155,5 @@ def test_without_mujoco_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch):
     model = robot("linear_axis", {})
     rng = np.random.default_rng(0)
     with pytest.raises(InputError, match=r"needs MuJoCo's toolbox .*; pip install") as caught:
-        RIVAL.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
+        BASELINE.answer(Problem(record(model, rng), model, {}, SIMULATOR), rng)
     assert "\n" not in str(caught.value)

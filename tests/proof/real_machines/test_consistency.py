@@ -119,8 +119,8 @@ def test_a_group_that_is_done_is_only_given_to_methods_that_are_missing(
 
     monkeypatch.setattr(consistency, "_diagnosed", diagnosed)
     assert program(*settings(axis)).status == 0
-    rivals = ("task.rivals=[regression]", "task.methods.regression.seconds=2")
-    answer = program(*settings(axis, *rivals, f"task.page={page}"))
+    baselines = ("task.baselines=[regression]", "task.methods.regression.seconds=2")
+    answer = program(*settings(axis, *baselines, f"task.page={page}"))
     assert (answer.status, answer.error) == (0, "")
     assert done == ["group01", "group02"]
     for row in ("| Axis | wipx | 2 | 2 | 0 | 0 | 0 | 0 |", "| Axis | regression | 2 |"):
@@ -151,7 +151,7 @@ def test_an_interrupted_run_leaves_the_table_of_what_is_done(
     ("argument", "said"),
     [
         ("task.only=[bamm]", "did you mean bam?"),
-        ("task.rivals=[regresion]", "did you mean regression?"),
+        ("task.baselines=[regresion]", "did you mean regression?"),
         ("task.groups=0", "task.groups is 0"),
         ("task.page=nowhere.md", "there is no file nowhere.md"),
     ],
