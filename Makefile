@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check bench lock clean
+.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -33,8 +33,12 @@ real: $(READY)  ## diagnose public recordings of real robots blind: the table of
 consistency: $(READY)  ## diagnose every public rig from one group of runs after the other (PROFILE=full: the table of docs/real_consistency.md)
 	$(PY) -m wipx +experiment=real_consistency profile=consistency_$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/real_consistency.md)
 
-concealed: $(READY)  ## diagnose 30 fresh robots with concealed physics (PROFILE=full: 300, the table of docs/blind_results.md)
-	$(PY) -m wipx +experiment=concealed profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)
+blind: $(READY)  ## diagnose 30 fresh robots with hidden physics (PROFILE=full: 300, the table of docs/blind_results.md)
+	$(PY) -m wipx +experiment=blind profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/blind_results.md)
+
+concealed:
+	@echo "make concealed: the name is make blind" >&2
+	@$(MAKE) --no-print-directory blind
 
 dirty: $(READY)  ## diagnose 20 fresh dirty robots (PROFILE=full: 200, the table of docs/dirty_robots.md)
 	$(PY) -m wipx +experiment=dirty profile=$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/dirty_robots.md)
@@ -76,7 +80,7 @@ ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 test: $(READY)  ## run the tests (without the slow ones)
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow"
 
-test-fresh: $(READY)  ## run the tests with random numbers that no run had (SEED=N: those of an earlier one)
+test-fresh: $(READY)  ## run the tests on fresh random numbers, statistical claims ten times (SEED=N: those of an earlier run)
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow" --seed=$(or $(SEED),fresh)
 
 test-slow: $(READY)  ## run the slow tests
@@ -90,12 +94,15 @@ check: $(READY)  ## lint, formatting and types
 	$(PY) -m ruff format --check
 	$(PY) -m pyright
 
+docs: $(READY)  ## build the site into runs/docs; open runs/docs/index.html
+	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
+
 bench: $(READY)  ## measure speed and memory
 	$(PY) benchmarks/run.py
 
 # Pins for every Python from 3.11 on and every platform; kept where they still fit, `UPGRADE=--upgrade` renews them.
 lock: $(READY)  ## renew requirements.lock after a change of pyproject.toml
-	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra rivals $(UPGRADE) \
+	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra baselines --extra docs $(UPGRADE) \
 		--no-emit-index-url --no-emit-find-links --no-annotate --no-header --output-file requirements.lock pyproject.toml
 
 clean:  ## remove runs/, caches and .venv

@@ -11,12 +11,10 @@ from timing import print_table, processor_time
 
 from wipx.config import build
 from wipx.control.controller import Controller
-from wipx.control.equilibrium import EquilibriumLqr, EquilibriumRegulator
-from wipx.control.loop import Loop
+from wipx.control.loop import ControlLoop
 from wipx.core.load import Load
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
-from wipx.learn.onnx_model import NetworkEstimator
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
@@ -47,7 +45,7 @@ def measure_controllers() -> dict[str, dict[str, float]]:
     friction = {"translation/lagged_stribeck": PAPER, "pitch/lagged_stribeck": PAPER}
     model = Model(plant, plant.complete(BODY, "benchmark"), {**friction, "actuator/delay": {"tau": 0.006}})
     estimator, _ = untrained(preset(NETWORK))
-    loops = {name: _loop(design, model, estimator) for name, design in _controllers().items()}
+    loops = {name: design.loop(model, estimator) for name, design in _controllers().items()}
     steps = {name: Steps() for name in loops}
     for _ in range(RELEASES):
         for name, loop in loops.items():
@@ -72,35 +70,26 @@ def measure_controllers() -> dict[str, dict[str, float]]:
     return results
 
 
-def _controllers() -> Mapping[str, Controller | EquilibriumLqr]:
+def _controllers() -> Mapping[str, Controller]:
     """All that ship, by name."""
     files = sorted((PRESETS.parent / "controller").glob("*.yaml"))
     return {path.stem: build(yaml.safe_load(path.read_text(encoding="utf-8")), "controller") for path in files}
 
 
-def _loop(design: Controller | EquilibriumLqr, model: Model, estimator: NetworkEstimator) -> Loop:
-    return design.loop(model, estimator) if isinstance(design, EquilibriumLqr) else design.loop(model)
-
-
-def _release(loop: Loop, model: Model, steps: Steps) -> None:
+def _release(loop: ControlLoop, model: Model, steps: Steps) -> None:
     """Release the loaded robot under a loop and note the time of every step."""
 
     def controller(t: float, measured: np.ndarray) -> np.ndarray:
         commands: list[np.ndarray] = []
         if t == 0.0:
             loop.reset(t, measured)
-        notes = _notes(loop)
+        notes = len(loop.notes)
         spent = processor_time(lambda: commands.append(loop.step(t, measured, np.zeros(4))))
-        (steps.answering if _notes(loop) > notes else steps.ordinary).append(spent)
+        (steps.answering if len(loop.notes) > notes else steps.ordinary).append(spent)
         return commands[0]
 
     inputs = Inputs.regular(DURATION, RATE, 1)
     AnalyticSimulator(threads=1).drive(LOAD.on(model), inputs, np.zeros(4), controller)
-
-
-def _notes(loop: Loop) -> int:
-    """How much the loop has said; an estimator that has answered adds a line."""
-    return len(loop.notes) if isinstance(loop, EquilibriumRegulator) else 0
 
 
 if __name__ == "__main__":

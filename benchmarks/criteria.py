@@ -24,11 +24,13 @@ from wipx.config import register
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.decision.context import HORIZON, Context
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import HORIZONS, ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.pipeline import in_two
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.rules import USUAL
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
@@ -50,7 +52,7 @@ class NotHeldOut(ForecastFitter):
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance."""
-        return LEAST_GAIN
+        return self.rules.selection.least_gain
 
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Always."""
@@ -84,7 +86,7 @@ class Case:
         """The means of a diagnosis."""
         halves = in_two(self.seen)
         setting = Setting(self.nominal, self.uncertainty, scales_of(self.nominal, halves))
-        return Context.of(halves, setting, AnalyticSimulator(threads=1))
+        return Context.of(halves, setting, AnalyticSimulator(threads=1), USUAL)
 
     def error(self, model: Model) -> float:
         """Root mean square error over half a second on what was not seen, over the nominal model's."""
@@ -103,7 +105,7 @@ def by_forecasts(kind: type[ForecastFitter], context: Context, setting: Setting)
 
 def ahead(kind: type[ForecastFitter], *, doubted: bool) -> Callable[[Context], Fitter]:
     """A criterion of forecasts, with the owner's exact numbers in doubt or not."""
-    return lambda i: by_forecasts(kind, i, i.setting.doubted() if doubted else i.setting)
+    return lambda i: by_forecasts(kind, i, i.setting.doubted(i.rules.forecasts.undeclared) if doubted else i.setting)
 
 
 CRITERIA: Mapping[str, Callable[[Context], Fitter]] = {
@@ -152,16 +154,16 @@ def searched(context: Context, fitter: Fitter) -> tuple[str, ...]:
         nominal = fitter.first_fit(start)
     else:
         nominal = fitter.converged(fitter.fit(start, context.first_levels))
-    return Selection(fitter, context.setting, nominal).run().effects
+    return Search.of(FitStore.of(fitter, context.setting, nominal), nominal).run().fit.effects
 
 
 def refitted(context: Context, effects: tuple[str, ...]) -> Model:
     """The nominal model with effects, fitted to forecasts from where screening has the best of each in turn."""
     fitter = by_forecasts(ForecastFitter, context, context.setting)
     fit = fitter.first_fit(Hypothesis.of(context.setting, (), {}))
-    search = Selection(fitter, context.setting, fit)
+    store = FitStore.of(fitter, context.setting, fit)
     for effect in effects:
-        starts = [each for each in search.candidates_for(fit) if each.effect == effect]
+        starts = [each for each in store.candidates_for(fit) if each.effect == effect]
         values = {**fit.hypothesis.values, **(starts[0].values if starts else {})}
         begun = Hypothesis.of(context.setting, (*fit.effects, effect), values)
         fit = fitter.converged(fitter.fit(begun, fit.levels))

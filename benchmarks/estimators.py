@@ -15,6 +15,7 @@ import yaml
 from kernel import BODY, RATE
 from timing import Timing, interleaved, print_table
 
+from wipx.config import build
 from wipx.control.lqr import Lqr
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
@@ -59,17 +60,16 @@ def measure_estimators(names: tuple[str, ...] = NETWORKS) -> dict[str, dict[str,
 def preset(name: str) -> NetworkRecipe:
     """The network of an option of `estimator`."""
     settings = yaml.safe_load((PRESETS / f"{name}.yaml").read_text(encoding="utf-8"))
-    settings.pop("_target_")
-    return NetworkRecipe(**settings)
+    return build(settings, "estimator")
 
 
 def untrained(recipe: NetworkRecipe) -> tuple[NetworkEstimator, int]:
     """An estimator as fast as a trained one, and the number of its weights."""
-    from wipx.learn.networks import PitchNetwork
+    from wipx.learn.networks.pitch_network import PitchNetwork
 
-    network = PitchNetwork(recipe.architecture, LENGTH)
+    network = PitchNetwork(recipe, LENGTH)
     with tempfile.TemporaryDirectory() as folder:
-        card = NetworkCard(VERSION, recipe.kind, LENGTH, PERIOD, 0.01, "")
+        card = NetworkCard(VERSION, type(recipe).__name__, LENGTH, PERIOD, 0.01, "")
         estimator = export(network, card, Path(folder, "estimator.onnx"))
     return estimator, sum(weights.numel() for weights in network.parameters())
 

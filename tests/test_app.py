@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from wipx.app import configuration_folder
+from wipx.renamed import renamed
 
 STUB_APP = Path(__file__).with_name("stub_app.py")
 SLOW_PACKAGES = {"torch", "mlflow", "pybullet", "numba", "scipy", "matplotlib", "plotly", "pandas"}
@@ -53,6 +54,34 @@ class CommandLine:
 @pytest.fixture
 def command_line(tmp_path: Path) -> CommandLine:
     return CommandLine(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("argument", "name"),
+    [
+        ("rival=regression", "baseline=regression"),
+        ("rival.behaviour=refuse", "baseline.behaviour=refuse"),
+        ("~rival", "~baseline"),
+        ("+task.rivals=[a]", "+task.baselines=[a]"),
+        ("task=concealed", "task=blind"),
+        ("target.engine=analytic", "sim@target.engine=analytic"),
+        ("target.engine.step=1e-3", "target.engine.step=1e-3"),
+        ("+experiment=concealed", "+experiment=blind"),
+        ("arrival=1", "arrival=1"),
+        ("task.rivalry=1", "task.rivalry=1"),
+    ],
+)
+def test_a_key_with_another_name_is_taken_and_its_name_is_said_once(
+    argument: str, name: str, capsys: pytest.CaptureFixture[str]
+):
+    assert renamed([argument, "seed=1"]) == [name, "seed=1"]
+    said = "" if name == argument else f"{argument}: the name is {name}\n"
+    assert capsys.readouterr().err == said
+
+
+def test_a_command_with_another_name_runs(command_line: CommandLine):
+    answer = command_line("rival=regression", "hydra.run.dir=out")
+    assert (answer.status, answer.error) == (0, "rival=regression: the name is baseline=regression\n")
 
 
 def test_a_task_gets_its_settings_and_leaves_its_configuration(command_line: CommandLine):

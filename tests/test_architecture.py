@@ -17,12 +17,13 @@ LAYERS = (
     {"library"},
     {"tasks"},
     {"proof"},
-    {"config"},
+    {"config", "renamed"},
     {"app"},
     {"__main__"},
 )
 DIAGNOSIS = (
-    {"likelihood"},
+    {"rules"},
+    {"likelihood", "rules_page"},
     {"candidates", "residuals", "next_experiment"},
     {"selection"},
     {"decision"},

@@ -58,6 +58,14 @@ def test_settings_reach_the_part_as_its_fields_are_annotated():
     assert type(part.starts) is tuple
 
 
+def test_a_part_within_a_part_is_built_and_named_by_its_place():
+    assert typed(node(), Search, "holder.search") == Search(10)
+    with pytest.raises(InputError, match=r"holder\.search\.budget is missing"):
+        typed({"_target_": "wipx.stub.Search"}, Search, "holder.search")
+    with pytest.raises(InputError, match=r"choose one with holder\.search=OPTION"):
+        typed("quick", Search, "holder.search")
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
@@ -114,10 +122,21 @@ def test_an_annotation_that_no_configuration_can_hold_is_a_defect():
         typed("x", Path, "sim.path")
 
 
+def composed(path: Path) -> dict[str, Any]:
+    """An option, with parts of other groups at its own keys as Hydra composes them."""
+    content = yaml.safe_load(path.read_text())
+    for item in content.pop("defaults", []):
+        for place, option in item.items() if isinstance(item, dict) else ():
+            group, _, key = place.lstrip("/").partition("@")
+            if "." not in key:
+                part = yaml.safe_load((configuration_folder() / group / f"{option}.yaml").read_text())
+                content[key] = {**part, **content.get(key, {})}
+    return content
+
+
 @pytest.mark.parametrize("path", OPTIONS, ids=lambda path: f"{path.parent.name}={path.stem}")
 def test_every_option_that_ships_builds_or_says_what_it_lacks(path: Path):
-    content = yaml.safe_load(path.read_text())
-    content.pop("defaults", None)  # options of other groups that are composed into this one
+    content = composed(path)
     missing = [key for key, value in content.items() if value == "???"]
     if missing:
         with pytest.raises(InputError, match=rf"{path.parent.name}\.{missing[0]} is missing"):

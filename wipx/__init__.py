@@ -25,13 +25,13 @@ def diagnose(
 
     Args:
         recordings: A folder of recordings, or recordings in SI.
-        robot: The nominal model: a robot.yaml or what `read_robot` makes of one; None for the folder's own.
-        suspects: Effects to ask about once the answer is complete, which they leave as it is: by "site/kind", each
-            with the values that are suspected, by symbol [SI], or with none, e.g. {"pitch/coulomb": {"F_c": 0.29}}.
+        robot: The nominal model: a robot.yaml or the result of `read_robot`; None for the folder's own.
+        suspects: Effects to test after the answer is complete; they do not change it. By "site/kind", each with the
+            suspected values by symbol [SI], or with none, e.g. {"pitch/coulomb": {"F_c": 0.29}}.
 
     Raises:
-        InputError: a file is missing or at fault, a suspect cannot be, recordings are too short or contradict the
-            model grossly.
+        InputError: a file is missing or invalid, a suspect does not exist on this robot, recordings are too short or
+            contradict the model grossly.
     """
     from wipx.library import diagnose_robot
 

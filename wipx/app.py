@@ -23,6 +23,7 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
+from wipx.renamed import renamed
 from wipx.tasks.files.finished import ERROR, SETTINGS
 from wipx.tasks.shared.job import Job
 
@@ -51,7 +52,7 @@ def main() -> int:
     """
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     # Hydra does not read overrides on both sides of the flag for a sweep.
-    sys.argv[1:] = sorted(sys.argv[1:], key=lambda argument: argument in ("-m", "--multirun"))
+    sys.argv[1:] = sorted(renamed(sys.argv[1:]), key=lambda argument: argument in ("-m", "--multirun"))
     register()
     started = time.time()
 

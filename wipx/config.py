@@ -45,6 +45,7 @@ class RunConfig:
         bounds: Search intervals [low, high] that replace the usual ones, by parameter [SI].
         model: The model to start from.
         task: What is done; like all the groups below a node with a `_target_`.
+        diagnosis: The rules of a diagnosis.
         recordings: Where recordings come from.
         plant: The nominal model.
         sim: The simulator.
@@ -53,7 +54,7 @@ class RunConfig:
         objective: The loss.
         target: The robot that is driven.
         controller: What drives it.
-        rival: What people would use in place of a diagnosis.
+        baseline: What people would use in place of a diagnosis.
         method: Which simulation a training set comes from.
         estimator: What estimates the equilibrium pitch.
         tracking: Where runs are logged.
@@ -67,6 +68,7 @@ class RunConfig:
     bounds: dict[str, Any] = field(default_factory=dict)
     model: ModelConfig = field(default_factory=ModelConfig)
     task: Any = None
+    diagnosis: Any = None
     recordings: Any = None
     plant: Any = None
     sim: Any = None
@@ -75,7 +77,7 @@ class RunConfig:
     objective: Any = None
     target: Any = None
     controller: Any = None
-    rival: Any = None
+    baseline: Any = None
     method: Any = None
     estimator: Any = None
     tracking: Any = None
@@ -124,7 +126,11 @@ def build(node: object, group: str) -> Any:
     if not isinstance(node, Mapping) or "_target_" not in node:
         raise InputError(f"{group}: no option is chosen (the node has no _target_); choose one with {group}=OPTION")
     target = _target(node["_target_"], f"{group}._target_")
-    settings = {key: value for key, value in node.items() if key != "_target_"}
+    return _filled(target, {key: value for key, value in node.items() if key != "_target_"}, group)
+
+
+def _filled(target: type[Any], settings: Mapping[Any, Any], group: str) -> Any:
+    """A frozen dataclass with settings; `group` is its node's name, for messages."""
     declared = {item.name: item for item in fields(target) if item.init}
     for key in settings:
         if key not in declared:
@@ -161,8 +167,15 @@ def _target(path: object, where: str) -> type[Any]:
     return target
 
 
+def _part(kind: type[Any], value: object, where: str) -> Any:
+    """A part of a part: the class that the value names, or else a dataclass with the settings that it lists."""
+    if is_dataclass(kind) and isinstance(value, Mapping) and "_target_" not in value:
+        return _filled(kind, value, where)
+    return build(value, where)
+
+
 def typed(value: object, kind: Any, where: str) -> Any:
-    """`value` as a field annotated `kind` takes it.
+    """`value` as a field annotated `kind` takes it; a field annotated with a class of this package holds a part.
 
     An integer is accepted where a float is expected and a list where a tuple is; a truth value is
     no number.
@@ -170,7 +183,7 @@ def typed(value: object, kind: Any, where: str) -> Any:
     Args:
         value: Plain containers, strings, numbers, truth values or None.
         kind: The annotation: these types, unions of them, `Literal`, `list[...]`, `tuple[...]`,
-            `dict[str, ...]`, `Mapping[str, ...]` or `Any`.
+            `dict[str, ...]`, `Mapping[str, ...]`, a frozen dataclass of such fields or `Any`.
         where: Key, for messages.
 
     Raises:
@@ -179,6 +192,8 @@ def typed(value: object, kind: Any, where: str) -> Any:
     """
     if kind is Any or kind is object:
         return value
+    if isinstance(kind, type) and kind.__module__.startswith(f"{PACKAGE}."):
+        return _part(kind, value, where)
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         return _member(value, kind, where)

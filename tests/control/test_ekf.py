@@ -166,8 +166,8 @@ def test_the_covariance_stays_one_over_long_runs():
     assert np.min(np.linalg.eigvalsh(ekf.covariance)) > 0.0
 
 
-def test_an_unknown_noise_level_is_refused_in_one_line():
-    with pytest.raises(InputError, match=r"controller\.noise: unknown noise level 'angel'; did you mean angle\?"):
+def test_an_unknown_noise_is_refused_in_one_line():
+    with pytest.raises(InputError, match=r"controller\.noise: unknown noise 'angel'; did you mean angle\?"):
         Lqr(noise={"angel": 1e-3})
     with pytest.raises(InputError, match=r"noise\.angle is 0"):
         Lqr(noise={"angle": 0.0})

@@ -58,6 +58,7 @@ def assert_found(diagnosis: Diagnosis, truth: Effects) -> None:
             assert abs(p.value - value) <= max(p.high - p.low, 2e-3 * abs(value)), (p, value)
 
 
+@pytest.mark.statistical(allowed=0.02)  # the bar of docs/blind_results.md
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_is_found_when_nothing_is_missing(kind: str, fresh_seed: int):
     answer = bench(kind, {}, fresh_seed).diagnosed()
@@ -85,7 +86,8 @@ def test_one_effect_is_named_with_its_size(name: str, fresh_seed: int):
     assert effect.log_evidence_gain > 30.0
     assert effect.heldout_gain > 0.8
     assert effect.share == pytest.approx(1.0)
-    assert all(answer.held_out.completed[c] < 0.3 * answer.held_out.nominal[c] for c in answer.held_out.completed)
+    for column, completed in answer.held_out.completed.items():  # a signal that the effect hardly moves is at its noise
+        assert completed < max(0.3 * answer.held_out.nominal[column], 1.1 * answer.held_out.noise_floor[column])
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ class Bench:
         settings = settings or MotorSettings(reply_within=0.002)
         self.robot = EmulatedRobot(WIP, QUIET, pitch, now)
         self.bus = FakeBus(EmulatedMotor(self.robot, Ranges(), settings.id, settings.master_id, angle))
-        self.port = FakePort(EmulatedImu(self.robot, QUIET, np.random.default_rng(), now))
+        self.port = FakePort(EmulatedImu(self.robot, QUIET, np.random.default_rng(0), now))
         self.motor = CanMotor(self.bus, settings, Ranges())
         self.imu = Imu(self.port, ImuSettings("nowhere"))
         drivetrain = Drivetrain(PARAMETERS["wheel_radius"], settings.direction, settings.on_body)

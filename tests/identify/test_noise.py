@@ -16,9 +16,8 @@ def noise_of(theta: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("level", [1e-5, 1e-3, 0.1])
-@pytest.mark.parametrize("fresh", [False, True])
-def test_white_noise_comes_back(level: float, fresh: bool, fresh_seed: int):
-    rng = np.random.default_rng(fresh_seed if fresh else 3)
+def test_white_noise_comes_back(level: float, fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
     # The quietest fifth of the blocks lies 19 % below the mean, with a spread of 4 %.
     assert noise_of(level * rng.normal(size=1000)) == pytest.approx(level, rel=0.4)
 

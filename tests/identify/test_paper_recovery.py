@@ -28,9 +28,9 @@ def values_of(problem: ClosedLoopProblem, model: Model) -> np.ndarray:
     return np.array([model.value(name) for name in problem.space.names])
 
 
-@pytest.mark.parametrize("fresh", [pytest.param(False, marks=pytest.mark.slow), True], ids=["fixed", "fresh"])
-def test_all_twelve_numbers_come_back_within_their_intervals(fresh: bool, fresh_seed: int):
-    rng = np.random.default_rng(fresh_seed if fresh else 1)
+@pytest.mark.statistical(allowed=0.02)
+def test_all_twelve_numbers_come_back_within_their_intervals(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
     truth = paper_robot(rng)
     seen, unseen = (release(truth, rng, trials=3, loads=LOADS[2:6]) for _ in range(2))
     problem = seen.problem(tuned=True)
@@ -40,7 +40,7 @@ def test_all_twelve_numbers_come_back_within_their_intervals(fresh: bool, fresh_
     ends = intervals(problem, found.cube)
     inside = (ends[:, 0] <= true) & (true <= ends[:, 1])
     # Of twelve intervals of 95 % three or more miss in one case of fifty.
-    assert np.sum(~inside) <= (3 if fresh else 1), list(zip(problem.space.names, true, ends.tolist(), strict=True))
+    assert np.sum(~inside) <= 2, list(zip(problem.space.names, true, ends.tolist(), strict=True))
     # The numbers stand in for each other; the force of the rail at a speed they agree on.
     model = problem.space.model.with_values(
         dict(zip(problem.space.names, problem.space.to_values(found.cube), strict=True))

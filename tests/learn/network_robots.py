@@ -10,6 +10,10 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.learn.dataset import Watch, generate
 from wipx.learn.estimator import PitchEstimate, Workshop
+from wipx.learn.networks.cnn1d import Cnn1d
+from wipx.learn.networks.recurrent import Gru, Lstm
+from wipx.learn.networks.tcn import Tcn
+from wipx.learn.networks.transformer import Transformer
 from wipx.learn.onnx_model import NetworkEstimator
 from wipx.learn.recipe import NetworkRecipe
 from wipx.learn.training_set import PARTS, TrainingSet
@@ -21,12 +25,12 @@ WHEEL = {"wheel_inertia": 0.0023, "wheel_radius": 0.0625}
 WIP = Model(plant_of("wip"), plant_of("wip").complete({**BODY, **WHEEL}, "test"), {})
 REGULATOR = (Lqr().feedback(WIP), 650.0)
 SIMULATOR = AnalyticSimulator(step=2e-3, threads=1)  # one step per row of the regulator
-SMALL = {
-    "lstm": NetworkRecipe("lstm", width=16, layers=1, epochs=15, batch=32, learning_rate=1e-2),
-    "gru": NetworkRecipe("gru", width=16, layers=1, epochs=15, batch=32, learning_rate=1e-2),
-    "tcn": NetworkRecipe("tcn", width=16, layers=4, kernel=3, epochs=15, batch=32, learning_rate=3e-3),
-    "transformer": NetworkRecipe("transformer", width=16, layers=1, heads=2, epochs=15, batch=32, learning_rate=3e-3),
-    "cnn1d": NetworkRecipe("cnn1d", width=16, layers=2, kernel=5, epochs=15, batch=32, learning_rate=3e-3),
+SMALL: dict[str, NetworkRecipe] = {
+    "lstm": Lstm(width=16, layers=1, epochs=15, batch=32, learning_rate=1e-2),
+    "gru": Gru(width=16, layers=1, epochs=15, batch=32, learning_rate=1e-2),
+    "tcn": Tcn(width=16, layers=4, kernel=3, epochs=15, batch=32, learning_rate=3e-3),
+    "transformer": Transformer(width=16, layers=1, heads=2, epochs=15, batch=32, learning_rate=3e-3),
+    "cnn1d": Cnn1d(width=16, layers=2, kernel=5, epochs=15, batch=32, learning_rate=3e-3),
 }
 
 

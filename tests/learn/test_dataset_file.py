@@ -59,7 +59,7 @@ def test_other_files_are_refused(training: TrainingSet, tmp_path: Path):
     path = tmp_path / "a.parquet"
     assert "no such file" in refusal(path)
     path.write_text("no table")
-    assert "no readable Parquet file" in refusal(path)
+    assert "not a readable Parquet file" in refusal(path)
     parquet.write_table(pa.table({"t": [0.0]}), path)
     assert "no training set" in refusal(path)
 

@@ -82,9 +82,7 @@ def test_units_are_the_networks_own_business(training: TrainingSet, tmp_path: Pa
 def test_training_stops_early_and_keeps_the_best_weights(training: TrainingSet, tmp_path: Path):
     recipe = replace(TINY, epochs=100, patience=3, learning_rate=0.02, annealed=False)
     told: list[float] = []
-    trained = train(
-        recipe.architecture, recipe.plan, workshop(training, tmp_path), lambda stage, share: told.append(share)
-    )
+    trained = train(recipe, workshop(training, tmp_path), lambda stage, share: told.append(share))
     stopping = divided(training.of("train")).stopping
     assert trained.epochs == trained.best_epoch + 3 < 100
     assert told == [pytest.approx((k + 1) / 100) for k in range(trained.epochs)]

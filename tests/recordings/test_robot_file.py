@@ -79,7 +79,7 @@ def test_known_loads_belong_to_the_recordings_that_their_patterns_match(tmp_path
 
 def test_a_recording_that_two_loads_claim_is_named(tmp_path: Path):
     robot = read_robot(robot_file(tmp_path, LOADED.replace("m16_*", "m*")))
-    with pytest.raises(InputError, match=r"^m08_1\.csv: claimed by the loads m08 and m16; mend .*$"):
+    with pytest.raises(InputError, match=r"^m08_1\.csv: claimed by the loads m08 and m16; correct .*$"):
         robot.load_of("m08_1.csv")
 
 
@@ -139,7 +139,7 @@ def test_command_in_volts_is_read_with_an_input_gain():
         (LOADED.replace("mass: 0.8", "mass: -0.8"), "m08: mass = -0.8, expected a non-negative number of kg"),
         (LOADED.replace("height: 0.45", "height: high"), "m08: height is 'high', expected a number (m, above"),
         (LOADED.replace('"m08_*.csv"', "8"), "m08: recordings is 8, expected a pattern of file names"),
-        ("plant: [wip\n", "line 2: no YAML"),
+        ("plant: [wip\n", "line 2: not YAML"),
         ("", "the file is empty"),
         ("- wip\n", "the file is a list"),
         (WIP + "3: 4\n", "key 3 is not a name"),
@@ -148,7 +148,7 @@ def test_command_in_volts_is_read_with_an_input_gain():
             "line 1: tag !!python/object/apply:os.system is not allowed",
         ),
         ("plant: !shell ls\n", "line 1: tag !shell is not allowed"),
-        ("plant: \x07\n", "no YAML"),
+        ("plant: \x07\n", "not YAML"),
     ],
 )
 def test_description_at_fault_is_named_in_one_line(tmp_path: Path, text: str, said: str):

@@ -78,7 +78,7 @@ def test_columns_follow_the_plant():
         ("x", {"column": 3}, "column is 3"),
         ("x", {"unwrap": True}, "unwrap is for angles"),
         ("theta", {"unwrap": "yes"}, "unwrap is 'yes'"),
-        ("u", {"constant": 0, "unit": "V"}, "constant stands alone; drop unit"),
+        ("u", {"constant": 0, "unit": "V"}, "constant replaces all other keys; drop unit"),
         ("x", "cart", "x is 'cart', expected settings"),
     ],
 )

@@ -9,8 +9,8 @@ from tasks.conftest import Program
 
 ROBOT = (
     "target=emulated_paper",
-    "target.engine=analytic",
-    "target.step=1e-3",
+    "sim@target.engine=analytic",
+    "target.engine.step=1e-3",
     "task.per_load=2",
     "task.held_out=[b3]",
     "friction=coulomb_viscous",
@@ -93,7 +93,7 @@ def test_a_sweep_gives_a_table_and_one_with_a_failed_job_does_not(program: Progr
     ],
 )
 def test_bad_input_is_one_line(program: Program, change: tuple[str, ...], expected: str):
-    keep = [a for a in ROBOT if not (a.startswith("target") and change[0].startswith("target"))]
+    keep = [a for a in ROBOT if not (a.startswith(("target", "sim@target")) and change[0].startswith("target"))]
     keep = [a for a in keep if not (a.startswith("objective") and change[0].startswith("objective"))]
     answer = program("task=adapt", "method=pure_sim", *keep, *change, "hydra.run.dir=bad")
     assert answer.status == 2

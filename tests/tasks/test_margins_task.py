@@ -14,8 +14,8 @@ QUICK = (
     "+experiment=margins",
     "method=pure_sim",
     "estimator=momentum_observer",
-    "target.engine=analytic",
-    "target.step=1e-3",
+    "sim@target.engine=analytic",
+    "target.engine.step=1e-3",
     "sim.threads=1",
     "task.dataset.samples=100",
     "task.dataset.checked=1",
@@ -74,7 +74,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(program: Program, tmp_pa
 
 
 def test_a_robot_without_carriage_is_refused(program: Program, folder: RecordingFolder):
-    own = (argument for argument in QUICK if not argument.startswith("target."))
+    own = (argument for argument in QUICK if not argument.startswith(("target.", "sim@target.")))
     answer = program(*own, "target=recordings", f"target.path={folder.path}")
     assert answer.status == 2
     assert answer.error == (

@@ -12,17 +12,17 @@ from wipx.recordings.source import RecordingSource
 from wipx.tasks.pipeline import logged_slower
 
 SHORT = (
-    "task.fitted=2",
+    "task.fitted=3",
     "task.fresh=1",
-    "task.duration=2.0",
-    "task.log_every=6",
+    "task.duration=3.0",
+    "task.log_every=3",
     "task.samples=100",
     "task.loads=[a2]",
     "task.per_load=1",
     "task.scenarios=[balancing]",
     "estimator.epochs=3",
-    "target.engine=analytic",
-    "target.step=5e-4",
+    "sim@target.engine=analytic",
+    "target.engine.step=5e-4",
 )
 
 
@@ -44,8 +44,8 @@ def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(prog
     assert answer.status == 0, answer.error
     out = tmp_path / "out"
     recordings = RecordingSource(path=str(out / "recordings")).load()
-    assert {r.name for r in recordings} == {"r1.csv", "r2.csv", "fresh1.csv"}
-    assert all(r.periods == 6 and 100.0 < r.rate < 115.0 for r in recordings)
+    assert {r.name for r in recordings} == {"r1.csv", "r2.csv", "r3.csv", "fresh1.csv"}
+    assert all(r.periods == 3 and 200.0 < r.rate < 230.0 for r in recordings)
     found = json.loads((out / "diagnosis" / "diagnosis.json").read_text())
     assert any(effect["name"].startswith("translation/") for effect in found["effects"])
     # What the estimator learned in is the completed model, and the truth was not part of it.
@@ -61,7 +61,7 @@ def test_the_chain_goes_from_recordings_to_control_and_tells_it_on_one_page(prog
     assert again.out == answer.out
     other = program("task=pipeline", *SHORT, "seed=5", "hydra.run.dir=out")
     assert other.status == 2
-    assert "begun by another command" in other.error
+    assert "made by another command" in other.error
 
 
 @pytest.mark.parametrize(

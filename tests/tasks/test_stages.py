@@ -38,7 +38,7 @@ def test_a_finished_stage_is_not_repeated_and_one_of_another_command_is_refused(
     written = (chain.out / "figure" / "friction.csv").stat().st_mtime_ns
     chain.run(figure())
     assert (chain.out / "figure" / "friction.csv").stat().st_mtime_ns == written
-    with pytest.raises(InputError, match="begun by another command"):
+    with pytest.raises(InputError, match="made by another command"):
         chain.run(figure("figure", "seed=3"))
 
 

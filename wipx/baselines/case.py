@@ -1,4 +1,4 @@
-"""What a rival is given and what it answers: the same for all of them."""
+"""What a baseline is given and what it answers: the same for all of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ def excluded(name: str, present: tuple[str, ...], plant: Plant) -> bool:
 
 @dataclass(frozen=True)
 class Found:
-    """An effect that a rival names.
+    """An effect that a baseline names.
 
     Attributes:
         name: "site/kind".
@@ -86,13 +86,13 @@ class Found:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a rival says.
+    """What a baseline says.
 
     Attributes:
         model: The completed model.
         found: Effects that it names.
         mismatch: Whether it says that the nominal model is wrong.
-        network: Acceleration that is added to the model; None for a rival that needs no network.
+        network: Acceleration that is added to the model; None for a baseline that needs no network.
         notes: What a reader must know, one sentence each.
     """
 
@@ -103,7 +103,7 @@ class Answer:
     notes: tuple[str, ...] = ()
 
 
-class Rival(Protocol):
+class Baseline(Protocol):
     """A method that people would use in place of a diagnosis."""
 
     @property

@@ -1,7 +1,7 @@
 """MuJoCo's own system identification toolbox (`mujoco.sysid`), fitted to short windows of the recordings.
 
 The toolbox estimates built-in parameters of an MJCF by Gauss-Newton within bounds. It names nothing: which of the
-fitted numbers are missing physics is read off the fit by the rule of the other rivals. It needs the extra `mujoco`;
+fitted numbers are missing physics is read off the fit by the rule of the other baselines. It needs the extra `mujoco`;
 predictions do not.
 """
 
@@ -145,7 +145,7 @@ def _toolbox() -> Toolbox:
         return Toolbox(*(importlib.import_module(name) for name in names))
     except ModuleNotFoundError as error:
         raise InputError(
-            f"rival=mujoco_sysid needs MuJoCo's toolbox ({error.name or error} is missing); "
+            f"baseline=mujoco_sysid needs MuJoCo's toolbox ({error.name or error} is missing); "
             'pip install "mujoco>=4.0,<5" absl-py colorama tabulate'
         ) from error
 

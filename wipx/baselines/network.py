@@ -64,7 +64,7 @@ def read_network(path: Path, *, features: int, joints: int) -> ResidualAccelerat
     Raises:
         InputError: the file is missing, no such file, or of another plant.
     """
-    remedy = "give the residual.npz that task=rival rival=residual_network wrote"
+    remedy = "give the residual.npz that task=baseline baseline=residual_network wrote"
     try:
         with np.load(path, allow_pickle=False) as content:
             network = ResidualAcceleration(**{item.name: content[item.name] for item in fields(ResidualAcceleration)})

@@ -114,7 +114,7 @@ def _torch() -> Any:
     try:
         return importlib.import_module("torch")
     except ModuleNotFoundError as error:
-        raise InputError("rival=residual_network needs PyTorch; pip install torch==2.13.0") from error
+        raise InputError("baseline=residual_network needs PyTorch; pip install torch==2.13.0") from error
 
 
 def _features(motion: Motion) -> np.ndarray:

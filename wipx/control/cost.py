@@ -5,14 +5,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wipx.control.controller import Controller
 from wipx.control.ekf import Ekf, FilterNoise
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model
 
 
 @dataclass(frozen=True)
-class QuadraticCost:
-    """The integral of y'Qy + u'Ru with y = [coordinates, rates], and what every loop has beside it.
+class QuadraticCost(Controller):
+    """A controller that minimises the integral of y'Qy + u'Ru with y = [coordinates, rates].
 
     Attributes:
         coordinates: Diagonal of Q for each coordinate; a plant with one joint uses the first.
@@ -20,7 +21,7 @@ class QuadraticCost:
         command: Diagonal of R.
         rate: Of the controller [Hz].
         limit: Largest command [N or N m].
-        noise: Levels of `FilterNoise` that replace the usual ones in the state estimate of `loop`, by name.
+        noise: Standard deviations of `FilterNoise` that replace the usual ones in the estimate of `loop`, by name.
     """
 
     coordinates: tuple[float, ...] = (20.0, 100.0)

@@ -44,17 +44,17 @@ class FilterNoise:
         check_positive(**{f"noise.{item.name}": getattr(self, item.name) for item in fields(self)})
 
     @classmethod
-    def of(cls, levels: Mapping[str, float], where: str) -> "FilterNoise":
-        """The usual levels, some of them replaced.
+    def of(cls, deviations: Mapping[str, float], where: str) -> "FilterNoise":
+        """The usual standard deviations, some of them replaced.
 
         Raises:
-            InputError: there is no such level; `where` names the key that holds them.
+            InputError: there is no such noise; `where` names the key that holds them.
         """
         known = [item.name for item in fields(cls)]
-        for name in levels:
+        for name in deviations:
             if name not in known:
-                raise unknown_name("noise level", name, known, where)
-        return cls(**dict(levels))
+                raise unknown_name("noise", name, known, where)
+        return cls(**dict(deviations))
 
 
 class Ekf:

@@ -6,11 +6,12 @@ force: the command that belongs to the reference is zero, and the position is he
 
 import logging
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 
 from wipx.control.balance_watch import BalanceWatch, check_carriage
+from wipx.control.controller import PitchEstimator, needed
 from wipx.control.ekf import Ekf
 from wipx.control.lqr import LqrDesign
 from wipx.control.regulator import Regulator
@@ -25,43 +26,6 @@ LOG = logging.getLogger(__name__)
 SLACK = 1e-9  # [s] by which a reading may come before the time it stands for
 
 
-class EstimatedPitch(Protocol):
-    """Equilibrium pitches with intervals."""
-
-    @property
-    def pitch(self) -> np.ndarray:
-        """Shape (N,) [rad]."""
-        ...
-
-    @property
-    def low(self) -> np.ndarray:
-        """Lower ends, shape (N,)."""
-        ...
-
-    @property
-    def high(self) -> np.ndarray:
-        """Upper ends, shape (N,)."""
-        ...
-
-
-class PitchEstimator(Protocol):
-    """Estimates equilibrium pitches from windows that begin at the release; every member of `estimator` is one."""
-
-    @property
-    def length(self) -> int:
-        """Samples of a window."""
-        ...
-
-    @property
-    def period(self) -> float:
-        """Time between them [s]."""
-        ...
-
-    def estimate(self, windows: np.ndarray) -> EstimatedPitch:
-        """From x and theta, shape (N, length, 2) [m, rad]."""
-        ...
-
-
 @dataclass(frozen=True)
 class EquilibriumLqr(LqrDesign):
     """Linear quadratic regulator about the balance that an estimator finds.
@@ -73,6 +37,8 @@ class EquilibriumLqr(LqrDesign):
         adaptive: Time over which the balance is estimated anew, continuously, once there is a first estimate [s]; by
             `BalanceWatch`, since estimators know windows from the release on only. None: the first estimate stays.
     """
+
+    asks_estimator: ClassVar[bool] = True
 
     alpha: float = 0.05
     beta: float = 0.1
@@ -86,7 +52,12 @@ class EquilibriumLqr(LqrDesign):
         if self.adaptive is not None:
             check_positive(adaptive=self.adaptive)
 
-    def loop(self, model: Model, estimator: PitchEstimator) -> "EquilibriumRegulator":
+    @property
+    def moves_balance(self) -> bool:
+        """It moves its pitch reference."""
+        return True
+
+    def loop(self, model: Model, estimator: PitchEstimator | None = None) -> "EquilibriumRegulator":
         """The gains for a model's rigid body, on a state estimated with the whole model.
 
         Args:
@@ -94,11 +65,11 @@ class EquilibriumLqr(LqrDesign):
             estimator: Of the equilibrium pitch; asked once per trial, when its window is full.
 
         Raises:
-            InputError: the robot is no body on a carriage, or its gains do not stabilise it.
+            InputError: the robot is no body on a carriage, its gains do not stabilise it, or there is no estimator.
         """
         check_carriage(model)
         check_stabilises(self.law(model), model, self.rate)
-        return EquilibriumRegulator(self.estimator(model), self.feedback(model), self, estimator)
+        return EquilibriumRegulator(self.estimator(model), self.feedback(model), self, needed(estimator))
 
 
 class EquilibriumRegulator(Regulator):
@@ -108,6 +79,8 @@ class EquilibriumRegulator(Regulator):
         balance: Pitch towards which the reference moves [rad].
         notes: What was decided during this trial, one line each.
     """
+
+    balance: float
 
     def __init__(
         self, estimator: Ekf, feedback: StateFeedback, settings: EquilibriumLqr, balance_estimator: PitchEstimator
@@ -177,7 +150,7 @@ class EquilibriumRegulator(Regulator):
         self._window.reset(t)
         self._asked = self._trusted = False
         self.balance = 0.0
-        self.notes: tuple[str, ...] = ()
+        self.notes = ()
         self._soft.reset()
         if self._watch is not None:
             self._watch.reset()

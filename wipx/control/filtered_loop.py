@@ -8,13 +8,18 @@ from wipx.control.ekf import Ekf
 
 
 class FilteredLoop(ABC):
-    """A control law on the state estimate of an extended Kalman filter; a `wipx.control.loop.Loop`.
+    """A control law on the state estimate of an extended Kalman filter; a `wipx.control.loop.ControlLoop`.
 
     Attributes:
         estimator: Gives the state.
         rate: Steps per second [Hz].
         limit: Largest command [N or N m].
+        balance: See `ControlLoop.balance`.
+        notes: See `ControlLoop.notes`.
     """
+
+    balance: float | None = None
+    notes: tuple[str, ...] = ()
 
     def __init__(self, estimator: Ekf, rate: float, limit: float) -> None:
         self.estimator = estimator

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.control.controller import PitchEstimator
 from wipx.control.cost import QuadraticCost, optimal_gains
 from wipx.control.ekf import Ekf
 from wipx.control.filtered_loop import FilteredLoop
@@ -51,7 +52,7 @@ class Lqi(QuadraticCost):
         gains = optimal_gains(a, b, weights, r)
         return LinearLaw(gains[:, :states], gains[:, states:], intake)
 
-    def loop(self, model: Model) -> "IntegralRegulator":
+    def loop(self, model: Model, estimator: PitchEstimator | None = None) -> "IntegralRegulator":
         """The gains for a model's rigid body, on a state estimated with the whole model.
 
         Raises:

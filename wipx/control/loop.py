@@ -39,3 +39,17 @@ class Loop(Protocol):
             Commands, shape (inputs,) [N or N m].
         """
         ...
+
+
+class ControlLoop(Loop, Protocol):
+    """The loop of a controller, which also says what it found out during a trial."""
+
+    @property
+    def balance(self) -> float | None:
+        """Estimated pitch at which the robot balances [rad]; None where no estimator is asked."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was decided during this trial, one line each."""
+        ...

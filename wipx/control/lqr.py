@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from wipx.control.controller import PitchEstimator
 from wipx.control.cost import QuadraticCost, optimal_gains
 from wipx.control.linear_law import LinearLaw
 from wipx.control.linearise import linearise
@@ -38,7 +39,11 @@ class LqrDesign(QuadraticCost):
 class Lqr(LqrDesign):
     """Holds the reference that it is given."""
 
-    def loop(self, model: Model) -> Regulator:
+    def state_feedback(self, model: Model) -> StateFeedback:
+        """It is one; see `feedback`."""
+        return self.feedback(model)
+
+    def loop(self, model: Model, estimator: PitchEstimator | None = None) -> Regulator:
         """The gains for a model's rigid body, on a state estimated with the whole model.
 
         Raises:

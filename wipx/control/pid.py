@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wipx.control.balance_watch import check_carriage
+from wipx.control.controller import Controller, PitchEstimator
 from wipx.control.ekf import Ekf, FilterNoise
 from wipx.control.filtered_loop import FilteredLoop
 from wipx.control.linear_law import LinearLaw
@@ -29,7 +30,7 @@ class PidGains:
 
 
 @dataclass(frozen=True)
-class Pid:
+class Pid(Controller):
     """Gains by a rule, from bandwidths that do not depend on the robot: poles of the nominal closed loop are placed.
 
     Two poles, of the pitch, lie at -`pitch_bandwidth` times the rate sqrt(a) at which the body falls while the wheels
@@ -42,7 +43,7 @@ class Pid:
         lean: Largest pitch that position may ask for; the integral does not grow beyond it [rad].
         rate: Of the controller [Hz].
         limit: Largest command [N].
-        noise: Levels of `FilterNoise` that replace the usual ones in the state estimate of `loop`, by name.
+        noise: Standard deviations of `FilterNoise` that replace the usual ones in the estimate of `loop`, by name.
     """
 
     pitch_bandwidth: float = 1.0
@@ -91,7 +92,7 @@ class Pid:
         (P, D), (p, i, d) = gains.pitch, gains.position
         return LinearLaw(np.array([[-P * p, P, -P * d, D]]), np.array([[-P * i]]), np.array([[1.0, 0.0, 0.0, 0.0]]))
 
-    def loop(self, model: Model) -> "PidRegulator":
+    def loop(self, model: Model, estimator: PitchEstimator | None = None) -> "PidRegulator":
         """The gains for a model's rigid body, on a state estimated with the whole model.
 
         Raises:

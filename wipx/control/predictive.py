@@ -4,13 +4,15 @@ Rawlings, Mayne and Diehl 2017, Model Predictive Control, ch. 1; solved by OSQP 
 Prog. Comp. 12).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from time import perf_counter
+from typing import Self
 
 import numpy as np
 
 from wipx.control.balance_watch import BalanceWatch, check_carriage
+from wipx.control.controller import PitchEstimator
 from wipx.control.cost import QuadraticCost
 from wipx.control.ekf import Ekf
 from wipx.control.filtered_loop import FilteredLoop
@@ -25,6 +27,7 @@ from wipx.core.model import Model
 TOLERANCE = 1e-4  # of the solver, in newtons, metres and radians; a CAN frame's step of force is 0.09 N
 ITERATIONS = 400  # at most; one is about 6 us
 SOFTNESS = np.array([1e6, 1e6])  # cost of a square metre and radian beyond limits; a whole fall costs some hundreds
+WITHIN = 0.95  # share of a rail within which it plans to stay
 ALPHA, BETA = 0.02, 1.0  # of the reference that follows a balance, as in Eq. 9: within some 0.1 s
 
 
@@ -64,6 +67,15 @@ class Mpc(QuadraticCost):
         if self.offset_free is not None:
             check_positive(offset_free=self.offset_free)
 
+    @property
+    def moves_balance(self) -> bool:
+        """Whether it plans about an estimated balance."""
+        return self.offset_free is not None
+
+    def on_rail(self, half: float) -> Self:
+        """The controller that plans to stay within nearly all of a rail, -half to +half [m]."""
+        return replace(self, rail=WITHIN * half)
+
     def plan(self, model: Model) -> Plan:
         """Predictions by a model's rigid body.
 
@@ -85,7 +97,7 @@ class Mpc(QuadraticCost):
         """
         return LinearLaw.of(self.plan(model).gains)
 
-    def loop(self, model: Model) -> "PredictiveRegulator":
+    def loop(self, model: Model, estimator: PitchEstimator | None = None) -> "PredictiveRegulator":
         """Predictions by a model's rigid body, from a state estimated with the whole model.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What a diagnosis leaves: the type that `wipx.diagnose` returns, tasks write and reports read."""
+"""The result of a diagnosis: the type that `wipx.diagnose` returns, tasks write and reports read."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -188,11 +188,11 @@ class Unexplained:
 
     Attributes:
         significant: Whether something is.
-        p_value: Of the strongest leftover if nothing were left, corrected for the number of places looked at.
+        p_value: Of the strongest residual force if nothing were left, corrected for the number of tests.
         site: Joint at which it acts; None where nothing is significant.
         shape: What it looks like, in words, e.g. "a force over x_dot"; empty where nothing is significant.
         resembles: Effects beyond the vocabulary that would explain it.
-        curve: The nonparametric force that stands in for it; None without one.
+        curve: The nonparametric force that was fitted in its place; None without one.
     """
 
     significant: bool
@@ -332,14 +332,14 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class SuspectedSize:
-    """A suspect held at the size that was suspected, everything else fitted anew.
+    """A suspect with the suspected size, all other numbers refitted.
 
     Attributes:
         values: What was suspected, by symbol [SI].
         loss: Nats by which the answer is better; negative where the answer is worse.
         loss_to_free: Nats by which the same effect with a free size is better.
         against_free: Whether the free size decides: the answer names the effect or has another in its place, or the
-            effect gains enough to be named; else the answer without the effect decides.
+            effect gains enough to be named. Otherwise the answer without the effect decides.
         limit: Nats of loss, to the one that decides, from which the size is excluded.
         excluded: Whether the recordings exclude the size, by 95 %.
         error_ratio: Prediction error on recordings it was not fitted to, over that of the answer.
@@ -356,7 +356,7 @@ class SuspectedSize:
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect that a person asked about, beside the effects of the answer.
+    """An effect that the user suspects, fitted beside the effects of the answer.
 
     Attributes:
         name: "site/kind".
@@ -368,7 +368,7 @@ class Suspect:
         heldout_gain: Share of the squared prediction error on recordings it was not fitted to that it removes then.
         transfers: Whether it makes recordings likelier that it was not fitted to.
         loss: Nats by which the answer is better than with this effect; zero or less unless it is `in_place_of` others.
-        size: What comes of the suspected size; None where none was given.
+        size: Result for the suspected size; None if none was given.
         sentence: All of it in words.
     """
 
@@ -416,8 +416,8 @@ class Diagnosis:
         notes: Warnings a reader must know, one sentence each.
         seconds: That the diagnosis took.
         combined: Laws that the vocabulary lacks and that explain several of the effects at once as well.
-        suspects: What was asked about after the answer was complete, and what these recordings say of it.
-        remainder: What the completed model leaves; None where that was not looked at.
+        suspects: Hypotheses that were tested after the answer was complete, and what these recordings say of them.
+        remainder: What the completed model leaves; None if it was not computed.
     """
 
     title: str

@@ -16,7 +16,9 @@ from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.rules import USUAL, Rules
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
 from wipx.sim.analytic import AnalyticSimulator
@@ -68,6 +70,7 @@ def diagnose(
     rng: np.random.Generator | None = None,
     watcher: Watcher = unwatched,
     suspects: Mapping[str, Mapping[str, float]] | None = None,
+    rules: Rules = USUAL,
 ) -> Diagnosis:
     """Find out what physics a nominal model lacks.
 
@@ -81,6 +84,7 @@ def diagnose(
         watcher: Told the stage and the share that is done.
         suspects: Effects to ask about once the answer is complete, by "site/kind", each with the values that are
             suspected, by symbol [SI], or with none; they do not change the answer.
+        rules: What decides.
 
     Raises:
         InputError: a recording is too short, a suspect cannot be, or the recordings contradict the nominal model
@@ -91,28 +95,29 @@ def diagnose(
     halves = in_two(recordings)
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    context = Context.of(halves, setting, simulator)
+    context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)
     fitter = context.by_row
     nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
-    selection = Selection(fitter, setting, nominal, context.transfers)
+    store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)
-    first = selection.extensions(nominal)
+    first = store.extensions(nominal)
     if context.is_driven:
-        check_plausible(fitter, setting, selection.nominal, first[0] if first else nominal, source)
+        check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
-    chosen = selection.run()
+    search = Search.of(store, nominal, context.held_out)
+    chosen = search.run()
     watcher("what is left over", 0.5)
-    end = found(context, selection, chosen)
-    context, selection, rest = end.context, end.selection, end.rest
+    end = found(context, search, chosen)
+    context, search, rest = end.context, end.search, end.rest
     watcher("held-out recordings", 0.75)
-    answer = answered(context, selection, rest, end.shapes)
+    answer = answered(context, search, rest, end.shapes)
     watcher("next experiment", 0.9)
-    proposal = proposed(context, selection, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    proposal = proposed(context, search, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
     answer = replace(answer, next_experiment=proposal)
     if suspected:
         watcher("suspects", 0.95)
-        answer = replace(answer, suspects=asked(context, selection, rest, answer, suspected))
+        answer = replace(answer, suspects=asked(context, search, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
-    return replace(answer, title=title, source=source, notes=caveats(recordings), seconds=seconds)
+    return replace(answer, title=title, source=source, notes=caveats(recordings, rules.answer), seconds=seconds)

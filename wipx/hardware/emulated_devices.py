@@ -40,9 +40,9 @@ class Surroundings:
 
 
 class EmulatedRobot:
-    """The equations of contract section 2 with friction, integrated up to the present whenever somebody looks.
+    """The equations of contract section 2 with friction, integrated up to the present whenever its state is read.
 
-    Until the motor is enabled somebody holds the body; when it is disabled somebody catches it.
+    The body is held until the motor is enabled, and caught when it is disabled.
 
     Args:
         model: A wip, loaded or not, without other effects.

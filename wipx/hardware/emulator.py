@@ -77,7 +77,7 @@ class Line:
         return b""
 
     def write(self, data: bytes) -> None:
-        """Send; what nobody takes is lost, as on a serial line."""
+        """Send; without a reader the data are lost, as on a serial line."""
         try:
             if self._terminal:
                 os.write(self._terminal[0], data)

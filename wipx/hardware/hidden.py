@@ -1,4 +1,4 @@
-"""What nobody knows of an emulated robot: drawn from a seed, written to a file, read by no identification.
+"""The hidden physics of an emulated robot: drawn from a seed, written to a file, read by no identification.
 
 `rich` is physics beyond the paper's model. `paper` is that model and nothing else, so that an identification of it
 can be held against the truth.

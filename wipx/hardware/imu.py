@@ -177,8 +177,8 @@ def open_imu(settings: ImuSettings) -> Imu:
 def times(samples: list[PitchSample]) -> np.ndarray:
     """When the samples were measured, by the computer's clock, shape (N,) [s].
 
-    The sensor's clock has no jitter but another zero; the sample that waited least before it was read tells the
-    difference. What all samples have in common, transport at least, stays in as a delay.
+    The sensor's clock has no jitter but another zero; the sample that waited least before it was read gives the
+    difference. A delay that all samples share, such as transport, remains.
     """
     read = np.array([sample.read_at for sample in samples])
     own = [sample.sensor_time for sample in samples if sample.sensor_time is not None]

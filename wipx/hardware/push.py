@@ -19,7 +19,7 @@ def pushed(model: Model, state: np.ndarray, push: Push) -> np.ndarray:
     Args:
         model: The robot with its load.
         state: Coordinates, then rates, before the push, shape (2 joints,).
-        push: Impulse and height; its time is not looked at.
+        push: Impulse and height; its time is ignored.
 
     Raises:
         InputError: the plant has no body on a carriage.

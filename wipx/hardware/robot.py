@@ -43,7 +43,7 @@ class HardwareTarget:
         motor: See `MotorSettings`.
         ranges: See `Ranges`.
         weights: Loads by name: mass [kg], height [m], side [m], see `Load`.
-        pitch_tolerance: Between the asked pitch and the one that the robot is held at [rad].
+        pitch_tolerance: Largest difference between the requested pitch and the one at which the robot is held [rad].
         rest_rate: Largest pitch rate of a robot at rest [rad/s].
         priority: Of SCHED_FIFO, 1 to 99; 0 to go without.
         emulated: Whether the lines lead to `wipx.hardware.emulator`; recordings then say so.
@@ -90,7 +90,9 @@ class HardwareTarget:
             InputError: no operator is there, a device is missing or lost, or a trial ended as soon as it began.
         """
         if not sys.stdin.isatty():
-            raise InputError("target=hardware: nobody can answer (the input is no terminal); run it from a terminal")
+            raise InputError(
+                "target=hardware: there is no operator (the input is not a terminal); run it from a terminal"
+            )
         for trial in trials:
             if trial.load is not None and trial.load not in self.loads:
                 raise unknown_name("load", trial.load, self.loads, "target.weights")
@@ -198,5 +200,6 @@ def _tell(trial: Trial, run: TrialRun) -> None:
     print(f"trial {trial.name}: {'; '.join(words)}", file=sys.stderr)
     if not run.switched_off:
         print(
-            "WARNING: the motor has not confirmed to be off; cut its power before you touch the robot", file=sys.stderr
+            "WARNING: the motor has not confirmed that it is off; cut its power before you touch the robot",
+            file=sys.stderr,
         )

@@ -20,7 +20,7 @@ class TrialRun:
         recording: Until the end, or until it was cut short; None where that was at once.
         cut_short: Why it was; None where it was not.
         device_lost: Whether that was for a device, so that no trial can follow.
-        switched_off: Whether the motor has confirmed to be off.
+        switched_off: Whether the motor has confirmed that it is off.
         overruns: Steps of the loop that were skipped because the one before ended late.
         lost_replies: Commands that the motor did not answer in time.
         damaged_messages: Of the IMU.

@@ -8,9 +8,9 @@ coordinates and rates; bristles of its friction and the play of its drive begin 
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -38,12 +38,11 @@ class EmulatedTestbed:
         kind: Its plant.
         parameters: Its rigid body without load, which its owner knows exactly [SI]. The wheel radius is what turns
             the motor's turns into the position x, of a cart or an axis too.
+        engine: Simulator that moves it; another than the one that is fitted, unless a test asks for it.
         weights: Loads that can be put on it, each with mass [kg], height and side [m], by name.
         physics: "rich": friction with memory, backlash, dead zone, latency, CAN steps, coloured IMU noise and bias;
             "paper": exactly the paper's joint model and white noise.
         seed: Draws what is hidden.
-        engine: Simulator that moves it; another than the one that is fitted, unless a test asks for it.
-        step: Of the engine [s].
         rail: Half its length; a plant with a position is stopped there [m].
         period_jitter: By how much a tick of the loop is late, mean of an exponential distribution [s].
         release_error: A hand releases the robot up to this angle beside the trial's pitch [rad].
@@ -51,17 +50,16 @@ class EmulatedTestbed:
 
     kind: str
     parameters: Mapping[str, float]
+    engine: Simulator
     weights: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     physics: Literal["rich", "paper"] = "rich"
     seed: int = 0
-    engine: Literal["mujoco", "pybullet", "analytic"] = "mujoco"
-    step: float = 1e-4
     rail: float = 1.8
     period_jitter: float = 5e-5
     release_error: float = 2e-3
 
     def __post_init__(self) -> None:
-        check_positive(step=self.step, rail=self.rail)
+        check_positive(rail=self.rail)
         for name in ("period_jitter", "release_error"):
             if not getattr(self, name) >= 0.0:
                 raise InputError(f"target.{name} is {getattr(self, name):g}, expected zero or a positive number")
@@ -72,6 +70,10 @@ class EmulatedTestbed:
     def loads(self) -> Mapping[str, Load]:
         """Weights that can be put on it, by name, as its owner has measured them."""
         return {name: settings_from(Load, place, f"target.weights.{name}") for name, place in self.weights.items()}
+
+    def stepping(self, step: float) -> "EmulatedTestbed":
+        """The testbed with an engine of another step [s]."""
+        return replace(self, engine=replace(cast(Any, self.engine), step=step))
 
     def nominal(self) -> Model:
         """The robot without load as its owner believes it to be."""
@@ -90,23 +92,20 @@ class EmulatedTestbed:
             InputError: a trial names a load that there is none of, its events are out of order, or the robot falls
                 at once.
         """
-        hidden, engine = self.hidden(), self._simulator()
+        hidden = self.hidden()
         for trial in trials:
             self._check(trial)
         for trial in trials:
             schedule = Schedule.drawn(trial.duration, loop.rate, self.period_jitter, hidden, rng)
             run = EmulatedTrial(trial, loop, hidden, schedule, {"x": self.rail, "theta": FALLEN}, rng)
             with suppress(RobotStoppedError):  # the log ends there
-                self._move(engine, hidden.model, schedule, run, self._released(trial, rng))
+                self._move(hidden.model, schedule, run, self._released(trial, rng))
             yield run.recording()
 
-    def _move(
-        self, engine: Simulator, unloaded: Model, schedule: Schedule, run: EmulatedTrial, state: np.ndarray
-    ) -> None:
+    def _move(self, unloaded: Model, schedule: Schedule, run: EmulatedTrial, state: np.ndarray) -> None:
         """Move the robot from event to event.
 
         Args:
-            engine: Moves it.
             unloaded: The robot without load.
             schedule: When its loop runs.
             run: What its loop is shown and commands.
@@ -118,13 +117,13 @@ class EmulatedTestbed:
         model, first = self._carrying(unloaded, run.trial.load), 0
         for event in run.trial.events:
             last = schedule.row_at(event.t)
-            state = _driven(engine, model, schedule, run, state, first, last)
+            state = _driven(self.engine, model, schedule, run, state, first, last)
             first = last
             if isinstance(event, Push):
                 state = pushed(model, state, event)
             else:
                 model = self._carrying(unloaded, event.load)
-        _driven(engine, model, schedule, run, state, first, len(schedule.rows) - 1)
+        _driven(self.engine, model, schedule, run, state, first, len(schedule.rows) - 1)
 
     def _carrying(self, unloaded: Model, load: str | None) -> Model:
         return unloaded if load is None else self.loads[load].on(unloaded)
@@ -149,19 +148,6 @@ class EmulatedTestbed:
             error = rng.uniform(-self.release_error, self.release_error)
             state[coordinates.index("theta")] = trial.pitch + error
         return state
-
-    def _simulator(self) -> Simulator:
-        if self.engine == "analytic":
-            from wipx.sim.analytic import AnalyticSimulator
-
-            return AnalyticSimulator(self.step, threads=1)
-        if self.engine == "mujoco":
-            from wipx.sim.mujoco import MujocoSimulator
-
-            return MujocoSimulator(step=self.step)
-        from wipx.sim.bullet import BulletSimulator
-
-        return BulletSimulator(step=self.step)
 
 
 def _driven(

@@ -146,10 +146,10 @@ class ClosedLoopProblem:
         return means
 
     def noise_floor(self, cube: np.ndarray | None = None) -> float:
-        """The loss that a perfect model would be left with, estimated from the scatter of the trials of a class.
+        """The loss that a perfect model would have, estimated from the scatter of the trials of a class.
 
-        The mean of n trials scatters n times less than they do. What a model explains of it, the places from which
-        they started, is subtracted.
+        The variance of a mean of n trials is 1/n of theirs. What a model explains of the scatter, the places from which
+        the trials started, is subtracted.
 
         Args:
             cube: Position of the model that is subtracted, shape (D,); None for where a search begins.

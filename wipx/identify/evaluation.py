@@ -27,8 +27,8 @@ USUAL = 3  # filter from which a prediction starts before any trial, among `BAND
 class Judge:
     """Predicts recordings window by window, contract section 4.
 
-    Where a prediction starts depends on how far the model is trusted (`Smoother`). Where the model does not say that
-    itself, it is learned as a recording goes on: each prediction starts from the filter whose own predictions have
+    The start of a prediction depends on how far the model is trusted (`Smoother`). If the model has no bandwidths of
+    its own, they are learned along the recording: each prediction starts from the filter whose own predictions have
     erred least in the rows that it may see.
 
     Attributes:

@@ -133,7 +133,7 @@ def identify(
 def _weighed_anew(
     problem: WindowProblem, minimum: Minimum, optimizer: Optimizer, rng: np.random.Generator, watcher: Watcher
 ) -> tuple[WindowProblem, Minimum]:
-    """Search once more, signals and windows weighed by the errors they were left with.
+    """Search once more, signals and windows weighed by the errors that remained.
 
     Weights from the sensor noise are right for a perfect model only; where one signal or one
     window fits far worse than its noise it would drown the others.
@@ -204,5 +204,5 @@ def _notes(
             if held_out.completed[name] > WORSE * held_out.nominal[name]
         ]
     if minimum.failed:
-        notes.append(f"{minimum.failed} of {minimum.history.evaluations[-1]} candidates fell over entirely.")
+        notes.append(f"{minimum.failed} of {minimum.history.evaluations[-1]} candidates diverged in every prediction.")
     return tuple(notes)

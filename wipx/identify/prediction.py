@@ -88,7 +88,7 @@ class Predictor:
         Args:
             batch: P models.
             near: States of a similar model, from which the estimate starts, shape (2 joints, P, R);
-                without them it starts from a parabola and sees more of each window by and by.
+                without them it starts from a parabola and sees more and more of each window.
             floor: Whether to propagate the sensor noise too.
         """
         starts = self._approaches(batch) if near is None else [near]
@@ -120,7 +120,7 @@ class Predictor:
 
     @cached_property
     def _softened(self) -> "Predictor":
-        """The same, with friction that builds up over what noise feigns as speed in ten milliseconds."""
+        """The same, with friction that builds up over the speed that noise alone suggests within ten milliseconds."""
         if self.simulator.smoothing:
             return self
         return replace(self, simulator=self.simulator.smoothed(tuple((100.0 * self.noise).tolist())))
@@ -259,7 +259,7 @@ class StateGain:
     def normal(self) -> np.ndarray:
         """Normal matrix, shape (P, R, 2 joints, 2 joints).
 
-        A joint that sticks tells nothing of its rate; a weak prior of a hundred steps
+        A joint that sticks gives no information about its rate; a weak prior of a hundred steps
         keeps the matrix regular.
         """
         product = np.einsum("akjpr,bkjpr->prab", self.slopes, self.slopes, optimize=True)

@@ -5,7 +5,7 @@ filter estimates that acceleration beside coordinates and rates. A fixed-lag pas
 `LOOK_AHEAD` later tell (Anderson, Moore 1979, Optimal Filtering, ch. 7; Bryson, Frazier 1963 for the backward
 recursion). The state follows the nonlinear model; gains are those of the body linearised along the recording.
 
-How freely the acceleration wanders is told by the bandwidth of the filter [rad/s]: the rate q [rad/s^2 per sqrt(s)]
+The bandwidth of the filter [rad/s] says how freely the acceleration wanders: the rate q [rad/s^2 per sqrt(s)]
 of a random walk and sensor noise of spectral density r [rad sqrt(s)] give a filter of the bandwidth (q/r)^(1/3).
 """
 

@@ -93,7 +93,7 @@ def _opened(path: Path) -> "tuple[pa.Table, Mapping[str, Any]]":
         table = parquet.read_table(path)
     except (pa.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0]
-        raise InputError(f"{path}: no readable Parquet file ({reason}); {AGAIN}") from error
+        raise InputError(f"{path}: not a readable Parquet file ({reason}); {AGAIN}") from error
     metadata = table.schema.metadata or {}
     if CARD not in metadata:
         raise InputError(f"{path}: a table, but no training set of task=dataset; give another file")

@@ -23,12 +23,12 @@ from wipx.learn.training_set import TrainingSet
 
 REACH = 1e-5  # [m, rad, m/s, rad/s, rad, kg] of central differences
 REST = (1e-4, 1e-4)  # [m/s, rad/s]; standard deviation of the rates of a robot at rest
-RATIO = 10.0**0.5  # between levels of noise that are tried
+RATIO = 10.0**0.5  # between standard deviations of the noise that are tried
 DIVERGED = 1.0  # [rad]; a balance that is further away is not believed
 
 
 @dataclass(frozen=True)
-class FilterLevels:
+class ObserverNoise:
     """Standard deviations that the filter reckons with.
 
     Attributes:
@@ -41,8 +41,8 @@ class FilterLevels:
     push: float = 3e-3
     wander: float = 1e-3
 
-    def neighbours(self) -> list["FilterLevels"]:
-        """Each level smaller or larger by `RATIO`."""
+    def neighbours(self) -> list["ObserverNoise"]:
+        """Each standard deviation smaller or larger by `RATIO`."""
         return [
             replace(self, **{name: getattr(self, name) * factor})
             for name in ("sensor", "push", "wander")
@@ -58,30 +58,30 @@ class BalanceFilter:
         body: What it predicts with.
         viewing: Of the windows.
         guess: Balance and mass of the load before anything is seen, shape (2,) [rad, kg].
-        spread: Their standard deviations, shape (2,).
-        levels: Of noise.
+        uncertainty: Their standard deviations, shape (2,).
+        noise: Of sensors and process.
     """
 
     body: LoadedBody
     viewing: Viewing
     guess: np.ndarray
-    spread: np.ndarray
-    levels: FilterLevels
+    uncertainty: np.ndarray
+    noise: ObserverNoise
 
     def balance(self, windows: np.ndarray) -> np.ndarray:
         """Pitch of balance after the last sample that counts, shape (N,) [rad]."""
         moving = self.viewing.moving(windows)
         states = np.tile([*np.zeros(4), *self.guess], (len(windows), 1))
-        covariance = np.tile(np.diag([*self.viewing.release, *REST, *self.spread]) ** 2, (len(windows), 1, 1))
+        covariance = np.tile(np.diag([*self.viewing.release, *REST, *self.uncertainty]) ** 2, (len(windows), 1, 1))
         with np.errstate(over="ignore", invalid="ignore"):  # of a window that no robot shows, the filter may diverge
             for k in range(self.viewing.length):
                 going = moving[:, k]  # the balance of a robot that was stopped is that of its last sample
                 if not going.any():
                     break
-                state, spread = states[going], covariance[going]
+                state, uncertainty = states[going], covariance[going]
                 if k:
-                    state, spread = self._predicted(state, spread)
-                states[going], covariance[going] = self._corrected(state, spread, windows[going, k])
+                    state, uncertainty = self._predicted(state, uncertainty)
+                states[going], covariance[going] = self._corrected(state, uncertainty, windows[going, k])
         return np.clip(np.nan_to_num(states[:, 4], nan=self.guess[0]), -DIVERGED, DIVERGED)
 
     def _predicted(self, states: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -90,12 +90,12 @@ class BalanceFilter:
         moves = REACH * np.concatenate([np.zeros((1, size)), np.eye(size), -np.eye(size)])
         later = self.body.moved(np.moveaxis(states[:, None] + moves, 2, 0), period)
         slopes = np.moveaxis(later[:, :, 1 : size + 1] - later[:, :, size + 1 :], 0, 1) / (2.0 * REACH)
-        added = np.diag([0.0, 0.0, self.levels.push, self.levels.push, self.levels.wander, 0.0]) ** 2 * period
+        added = np.diag([0.0, 0.0, self.noise.push, self.noise.push, self.noise.wander, 0.0]) ** 2 * period
         return later[:, :, 0].T, slopes @ covariance @ slopes.swapaxes(1, 2) + added
 
     def _corrected(self, states, covariance, shown) -> tuple[np.ndarray, np.ndarray]:
         """State and covariance after position and pitch (N, 2) were shown."""
-        innovation = covariance[:, :2, :2] + self.levels.sensor**2 * np.eye(2)
+        innovation = covariance[:, :2, :2] + self.noise.sensor**2 * np.eye(2)
         gains = np.linalg.solve(innovation, covariance[:, :2]).swapaxes(1, 2)
         new = states + np.einsum("nij,nj->ni", gains, shown - states[:, :2])
         narrowed = covariance - gains @ covariance[:, :2]
@@ -131,8 +131,8 @@ class MomentumObserver:
     """Follows every window with one filter.
 
     Attributes:
-        windows: Of the training part on which the levels of noise are chosen, at most.
-        rounds: Of the search for them, at most; each tries every level smaller and larger.
+        windows: Of the training part on which the noise is chosen, at most.
+        rounds: Of the search for them, at most; each tries every standard deviation smaller and larger.
     """
 
     windows: int = 200
@@ -145,7 +145,7 @@ class MomentumObserver:
             )
 
     def prepare(self, workshop: Workshop, watcher: Watcher) -> "ObserverEstimator":
-        """Choose levels and line on the training part, calibrate on the whole validation part.
+        """Choose noise and line on the training part, calibrate on the whole validation part.
 
         Args:
             workshop: Robots, model and controller; nothing is written to its folder.
@@ -159,8 +159,8 @@ class MomentumObserver:
         train, validation = parts.train, parts.validation
         body = LoadedBody.of(workshop.model, train.loads, workshop.feedback[0])
         guess = np.array([train.pitch.mean(), train.loads[:, 0].mean()])
-        spread = np.array([train.pitch.std(), train.loads[:, 0].std()])
-        chosen = self._chosen(BalanceFilter(body, viewing, guess, spread, FilterLevels()), train, watcher)
+        uncertainty = np.array([train.pitch.std(), train.loads[:, 0].std()])
+        chosen = self._chosen(BalanceFilter(body, viewing, guess, uncertainty, ObserverNoise()), train, watcher)
         line = Line.through(chosen.balance(train.windows.astype(float)), train.pitch)
         estimator = ObserverEstimator(chosen, line, 0.0)
         errors = estimator.estimate(validation.windows).pitch - validation.pitch
@@ -168,22 +168,22 @@ class MomentumObserver:
         return replace(estimator, half_width=half_width(errors, COVERAGE))
 
     def _chosen(self, first: BalanceFilter, train: TrainingSet, watcher: Watcher) -> BalanceFilter:
-        """The levels with the least error of corrected estimates, by a search along each."""
+        """The noise with the least error of corrected estimates, by a search along each."""
         windows, pitch = train.windows[: self.windows].astype(float), train.pitch[: self.windows]
 
-        def error(levels: FilterLevels) -> float:
-            balance = replace(first, levels=levels).balance(windows)
+        def error(noise: ObserverNoise) -> float:
+            balance = replace(first, noise=noise).balance(windows)
             return float(np.mean((Line.through(balance, pitch).at(balance) - pitch) ** 2))
 
-        errors = {first.levels: error(first.levels)}
-        best = first.levels
+        errors = {first.noise: error(first.noise)}
+        best = first.noise
         for number in range(self.rounds):
-            watcher("choosing levels of noise", number / self.rounds)
-            errors |= {levels: error(levels) for levels in best.neighbours() if levels not in errors}
+            watcher("choosing the noise", number / self.rounds)
+            errors |= {noise: error(noise) for noise in best.neighbours() if noise not in errors}
             before, best = best, min(errors, key=errors.__getitem__)
             if best == before:
                 break
-        return replace(first, levels=best)
+        return replace(first, noise=best)
 
 
 @dataclass(frozen=True)

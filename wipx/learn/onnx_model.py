@@ -18,7 +18,7 @@ from wipx.learn.estimator import PitchEstimate, check_windows
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
 
-    from wipx.learn.networks import PitchNetwork
+    from wipx.learn.networks.pitch_network import PitchNetwork
 
 VERSION = 1  # of the networks; another one cannot be read
 METADATA = "wipx"  # key of the card in the file
@@ -31,7 +31,7 @@ class NetworkCard:
 
     Attributes:
         version: Of the networks.
-        kind: Of the network, as in `Architecture`.
+        kind: Class of the network's recipe.
         length: Samples of a window.
         period: Time between them [s].
         half_width: Of the 90 % interval [rad].

@@ -1,47 +1,44 @@
-"""The recipe of a network that estimates the equilibrium pitch: kind, sizes and training as plain settings."""
+"""The recipe of a network that estimates the equilibrium pitch: how it is trained, as plain settings.
 
-from dataclasses import dataclass
+Each network is a subclass in `wipx.learn.networks`, with its sizes and with its layers in PyTorch.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wipx.core.errors import InputError
-from wipx.learn.architecture import Architecture, Kind
+from wipx.core.errors import InputError, check_positive
 from wipx.learn.conformal import half_width, rank
 from wipx.learn.dataset_file import digest_of
 from wipx.learn.estimator import COVERAGE, Watcher, Workshop
 from wipx.learn.onnx_model import VERSION, NetworkCard, NetworkEstimator, export
-from wipx.learn.training_plan import TrainingPlan
 from wipx.learn.training_set import PARTS, TrainingSet
+
+if TYPE_CHECKING:
+    from torch import nn
 
 FEWEST = 10  # robots to learn from, one of which decides when to stop
 
 
-@dataclass(frozen=True)
-class NetworkRecipe:
+@dataclass(frozen=True, kw_only=True)
+class NetworkRecipe(ABC):
     """A network, trained on Lightning, with a conformal interval; as long as the training set's windows.
 
     Attributes:
-        kind: Of the network.
-        width: Hidden size, channels or model dimension.
-        layers: How many of them are stacked.
         epochs: At most.
-        kernel: Samples that a convolution spans; of tcn and cnn1d.
-        heads: Of the attention; of a transformer.
         patience: Epochs without progress on robots that are not learned from, after which training stops.
         batch: Windows per step.
         learning_rate: Of Adam, at the start.
         weight_decay: Of Adam.
-        annealed: Whether the learning rate falls to zero along half a cosine over `epochs`.
-        seconds: Budget of the training; where it ends a training, the same seed need not give the same network.
+        annealed: Whether the learning rate falls to zero along half a cosine over `epochs`; constant if not.
+        seconds: Budget of the training, looked at after every epoch; where it ends a training, the same seed need not
+            give the same network.
     """
 
-    kind: Kind
-    width: int
-    layers: int
     epochs: int
-    kernel: int | None = None
-    heads: int | None = None
     patience: int = 15
     batch: int = 64
     learning_rate: float = 1e-3
@@ -50,26 +47,15 @@ class NetworkRecipe:
     seconds: float = 600.0
 
     def __post_init__(self) -> None:
-        # Each checks its settings.
-        _ = self.architecture, self.plan
+        numbers = {item.name: getattr(self, item.name) for item in fields(self) if item.type in (int, float)}
+        decay = numbers.pop("weight_decay")
+        check_positive(**{f"estimator.{name}": value for name, value in numbers.items()})
+        if not decay >= 0.0:
+            raise InputError(f"estimator.weight_decay is {decay:g}, expected zero or more")
 
-    @property
-    def architecture(self) -> Architecture:
-        """Kind and sizes."""
-        return Architecture(self.kind, self.width, self.layers, self.kernel, self.heads)
-
-    @property
-    def plan(self) -> TrainingPlan:
-        """How long and how fast it is trained."""
-        return TrainingPlan(
-            self.epochs,
-            self.patience,
-            self.batch,
-            self.learning_rate,
-            self.weight_decay,
-            annealed=self.annealed,
-            seconds=self.seconds,
-        )
+    @abstractmethod
+    def body(self, length: int) -> "nn.Module":
+        """The layers: from normalised windows, shape (N, length, 2), to numbers, shape (N, 1)."""
 
     def prepare(self, workshop: Workshop, watcher: Watcher) -> NetworkEstimator:
         """Train, calibrate and export; `estimator.onnx` and `estimator.npz` are written to the workshop's folder.
@@ -87,14 +73,25 @@ class NetworkRecipe:
         from wipx.learn.checkpoint import write_network
         from wipx.learn.training import train
 
-        trained = train(self.architecture, self.plan, workshop, watcher)
+        trained = train(self, workshop, watcher)
         network = trained.network
         error = half_width(network.predict(calibration.windows) - calibration.pitch, COVERAGE)
         card = NetworkCard(
-            VERSION, self.kind, network.length, workshop.training.period, error, digest_of(workshop.training)
+            VERSION,
+            type(self).__name__,
+            network.length,
+            workshop.training.period,
+            error,
+            digest_of(workshop.training),
         )
         write_network(workshop.folder / "estimator.npz", network)
         return export(network, card, workshop.folder / "estimator.onnx")
+
+
+def check_odd(kernel: int) -> None:
+    """Refuse a convolution that has no sample in its middle."""
+    if kernel % 2 == 0:
+        raise InputError(f"estimator.kernel is {kernel}, expected an odd number of samples")
 
 
 def _check(robots: TrainingSet, calibration: TrainingSet) -> None:

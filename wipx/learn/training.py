@@ -22,10 +22,9 @@ from torch.optim.lr_scheduler import CosineAnnealingLR
 from torch.utils.data import BatchSampler, DataLoader, RandomSampler, SequentialSampler, TensorDataset
 
 from wipx.core.errors import InputError
-from wipx.learn.architecture import Architecture
 from wipx.learn.estimator import Watcher, Workshop
-from wipx.learn.networks import PitchNetwork
-from wipx.learn.training_plan import TrainingPlan
+from wipx.learn.networks.pitch_network import PitchNetwork
+from wipx.learn.recipe import NetworkRecipe
 from wipx.learn.training_set import TrainingSet
 
 STOPPING = "stopping_loss"  # name that Lightning logs it under
@@ -70,12 +69,11 @@ def divided(training: TrainingSet) -> Division:
     return Division(_chosen(training, ~stops), _chosen(training, stops))
 
 
-def train(architecture: Architecture, plan: TrainingPlan, workshop: Workshop, watcher: Watcher) -> Trained:
+def train(recipe: NetworkRecipe, workshop: Workshop, watcher: Watcher) -> Trained:
     """Fit a network to the training part of a training set.
 
     Args:
-        architecture: Kind and sizes.
-        plan: How long and how fast.
+        recipe: The network, how long and how fast it is trained.
         workshop: Robots and seed; nothing is left in its folder.
         watcher: Told the share of the epochs that is done.
 
@@ -84,13 +82,13 @@ def train(architecture: Architecture, plan: TrainingPlan, workshop: Workshop, wa
     """
     robots = divided(workshop.training.of("train"))
     learning = robots.learning
-    keeper = _BestWeights(plan.seconds, lambda epochs: watcher("training", epochs / plan.epochs))
+    keeper = _BestWeights(recipe.seconds, lambda epochs: watcher("training", epochs / recipe.epochs))
     with _quiet_and_repeatable(workshop.seed):
-        network = PitchNetwork(architecture, learning.windows.shape[1])
+        network = PitchNetwork(recipe, learning.windows.shape[1])
         network.normalise_to(learning.windows, learning.pitch)
         trainer = Trainer(
-            max_epochs=plan.epochs,
-            callbacks=[EarlyStopping(STOPPING, patience=plan.patience), keeper],
+            max_epochs=recipe.epochs,
+            callbacks=[EarlyStopping(STOPPING, patience=recipe.patience), keeper],
             accelerator="auto",
             devices=1,
             deterministic=True,
@@ -102,10 +100,10 @@ def train(architecture: Architecture, plan: TrainingPlan, workshop: Workshop, wa
             default_root_dir=workshop.folder,
         )
         order = torch.Generator().manual_seed(workshop.seed)
-        batches = _batches(learning, plan.batch, order)
-        trainer.fit(_Regression(network, plan), batches, _batches(robots.stopping, plan.batch))
+        batches = _batches(learning, recipe.batch, order)
+        trainer.fit(_Regression(network), batches, _batches(robots.stopping, recipe.batch))
     if not isfinite(keeper.loss):
-        raise InputError(f"estimator: training diverges at learning_rate {plan.learning_rate:g}; make it smaller")
+        raise InputError(f"estimator: training diverges at learning_rate {recipe.learning_rate:g}; make it smaller")
     network.cpu().load_state_dict(keeper.weights)
     return Trained(network.eval(), keeper.epochs, keeper.best, keeper.loss**0.5)
 
@@ -113,10 +111,9 @@ def train(architecture: Architecture, plan: TrainingPlan, workshop: Workshop, wa
 class _Regression(LightningModule):
     """What Lightning needs to know of a training: the loss and the optimiser."""
 
-    def __init__(self, network: PitchNetwork, plan: TrainingPlan) -> None:
+    def __init__(self, network: PitchNetwork) -> None:
         super().__init__()
         self.network = network
-        self.plan = plan
 
     def training_step(self, batch: list[Tensor]) -> Tensor:
         """The mean squared error of a batch, in units of the pitches' variance, which the learning rate fits."""
@@ -130,9 +127,11 @@ class _Regression(LightningModule):
 
     def configure_optimizers(self):
         """Adam (paper, Sec. IV-B), and the schedule of the learning rate."""
-        plan = self.plan
-        optimizer = torch.optim.Adam(self.network.parameters(), lr=plan.learning_rate, weight_decay=plan.weight_decay)
-        return ([optimizer], [CosineAnnealingLR(optimizer, plan.epochs)]) if plan.annealed else optimizer
+        recipe = self.network.recipe
+        optimizer = torch.optim.Adam(
+            self.network.parameters(), lr=recipe.learning_rate, weight_decay=recipe.weight_decay
+        )
+        return ([optimizer], [CosineAnnealingLR(optimizer, recipe.epochs)]) if recipe.annealed else optimizer
 
 
 class _BestWeights(Callback):

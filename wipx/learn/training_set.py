@@ -7,6 +7,7 @@ import numpy as np
 
 PARTS = ("train", "validation", "test")
 SIGNALS = ("x", "theta")
+CHANNELS = len(SIGNALS)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wipx.baselines.case import Problem, Rival
+from wipx.baselines.case import Baseline, Problem
 from wipx.core.errors import InputError, unknown_name
 from wipx.proof.unseen import Unseen
 from wipx.recordings.source import RecordingSource
@@ -46,15 +46,15 @@ class MethodAnswer:
     refusal: str = ""
 
 
-def check_methods(rivals: Iterable[str], methods: Mapping[str, Any]) -> None:
+def check_methods(baselines: Iterable[str], methods: Mapping[str, Any]) -> None:
     """Refuse methods that are not there.
 
     Raises:
         InputError: it lists those that are.
     """
-    for name in rivals:
+    for name in baselines:
         if name not in methods:
-            raise unknown_name("method", name, methods, "task.rivals")
+            raise unknown_name("method", name, methods, "task.baselines")
 
 
 def ask(job: Job, method: str, settings: object, source: RecordingSource, unseen: Unseen) -> MethodAnswer:
@@ -63,20 +63,20 @@ def ask(job: Job, method: str, settings: object, source: RecordingSource, unseen
     Args:
         job: Gives seed, nominal model and simulator.
         method: Name of the method.
-        settings: Its option of the group `rival`.
+        settings: Its option of the group `baseline`.
         source: The recordings that it sees.
         unseen: Those that it predicts.
 
     Raises:
         InputError: the method's settings are at fault, or it lacks a package.
     """
-    rival: Rival = job.build(settings, f"task.methods.{method}")
+    baseline: Baseline = job.build(settings, f"task.methods.{method}")
     description = source.describe()
     nominal = job.part("plant").nominal(description.model)
     case = Problem(source.load(), nominal, description.uncertainty, job.part("sim"))
     begun = time.perf_counter()
     try:
-        answer = rival.answer(case, np.random.default_rng(job.seed))
+        answer = baseline.answer(case, np.random.default_rng(job.seed))
     except (InputError, ArithmeticError, np.linalg.LinAlgError) as failure:  # what these recordings are too hard for
         return MethodAnswer(method, seconds=time.perf_counter() - begun, refusal=f"{failure}")
     seconds = time.perf_counter() - begun

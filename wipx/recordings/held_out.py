@@ -40,7 +40,7 @@ def _matching(recordings: tuple[Recording, ...], patterns: list[str]) -> set[str
     names = [recording.name for recording in recordings]
     for pattern in patterns:
         if not any(fnmatch(name, pattern) for name in names):
-            raise InputError(f"recordings.held_out: {pattern} matches none of {', '.join(names)}; mend the pattern")
+            raise InputError(f"recordings.held_out: {pattern} matches none of {', '.join(names)}; correct the pattern")
     return {name for name in names if any(fnmatch(name, pattern) for pattern in patterns)}
 
 

@@ -32,7 +32,7 @@ ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads")
 
 
 def write_model(model: Model, path: Path) -> None:
-    """Write a model; the file is complete or not there at all.
+    """Write a model; the file is written whole or not at all.
 
     Numbers are written with all digits, so that `read_model` returns the same ones.
     """
@@ -57,7 +57,7 @@ def read_model(path: Path) -> Model:
     """The model in a model.yaml or a robot.yaml; nothing in the file is executed.
 
     Raises:
-        InputError: the file is missing or no plain YAML, a key, parameter or effect is unknown,
+        InputError: the file is missing or not plain YAML, a key, parameter or effect is unknown,
             missing or of the wrong sign.
     """
     data = load_mapping(path)
@@ -73,7 +73,7 @@ def model_from_mapping(data: Mapping[str, object], where: str, folder: Path | No
     """The model that the keys plant, parameters and effects describe.
 
     Args:
-        data: Content of a file or of a configuration; further keys are left alone.
+        data: Content of a file or of a configuration; further keys are ignored.
         where: File or key that holds it, for messages.
         folder: That paths in it are relative to; None for the present one.
 

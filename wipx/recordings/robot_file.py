@@ -43,7 +43,7 @@ class ControllerDescription:
 
 @dataclass(frozen=True)
 class KnownLoad:
-    """A weight that was on the body in some of the recordings.
+    """A weight that the body carried in some of the recordings.
 
     Attributes:
         load: Its mass and place.
@@ -92,7 +92,7 @@ class RobotDescription:
         claims = [name for name, known in self.loads.items() if fnmatch(recording, known.recordings)]
         if len(claims) > 1:
             raise InputError(
-                f"{recording}: claimed by the loads {' and '.join(claims)}; mend their recordings patterns"
+                f"{recording}: claimed by the loads {' and '.join(claims)}; correct their recordings patterns"
             )
         return self.loads[claims[0]].load if claims else None
 
@@ -101,7 +101,7 @@ def read_robot(path: Path) -> RobotDescription:
     """The description in a robot.yaml.
 
     Raises:
-        InputError: the file is missing or no plain YAML, or its content is at fault.
+        InputError: the file is missing or not plain YAML, or its content is at fault.
     """
     return robot_from_mapping(load_mapping(path), str(path), path.parent)
 

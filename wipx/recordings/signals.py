@@ -107,7 +107,9 @@ def signal_from_mapping(name: str, data: object, plant: Plant, where: str) -> Si
         if key not in valid:
             raise unknown_name("setting", key, valid, where)
     if "constant" in data and len(data) > 1:
-        raise InputError(f"{where}: constant stands alone; drop {', '.join(k for k in data if k != 'constant')}")
+        raise InputError(
+            f"{where}: constant replaces all other keys; drop {', '.join(k for k in data if k != 'constant')}"
+        )
     expected = plant.unit_of(name)
     signal = Signal(
         column=_text(data, "column", name, where),

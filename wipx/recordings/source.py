@@ -78,7 +78,7 @@ class RecordingSource:
         recordings = self.load_all()
         if any(load is not None for load in self.loads(recordings)):
             raise InputError(
-                f"{self._where()} names loads, so its recordings are of robots that differ; use task=adapt, or "
+                f"{self._where()} names loads, so its recordings show different robots; use task=adapt, or "
                 "choose recordings without a load with recordings.files=[...]"
             )
         return recordings
@@ -93,7 +93,7 @@ class RecordingSource:
         paths = self._paths(self.files)
         for pattern in self.spans:
             if not any(fnmatch(name, pattern) for name in paths):
-                raise InputError(f"recordings.spans: {pattern} matches none of {', '.join(paths)}; mend the pattern")
+                raise InputError(f"recordings.spans: {pattern} matches none of {', '.join(paths)}; correct the pattern")
         return tuple(self._recording(name, path, robot) for name, path in paths.items())
 
     def loads(self, recordings: tuple[Recording, ...]) -> tuple[Load | None, ...]:
@@ -104,13 +104,13 @@ class RecordingSource:
         """
         robot = self.describe()
         if robot.loads:
-            # Of all files, not the chosen ones: who chooses some need not mend robot.yaml.
+            # Of all files, not the chosen ones: who chooses some need not correct robot.yaml.
             everything = self._paths((*self.files, *GENERAL_PATTERNS))
             for name, known in robot.loads.items():
                 if not any(fnmatch(file, known.recordings) for file in everything):
                     raise InputError(
                         f"{self._where()}: loads: {name}: {known.recordings} matches none of the recordings; "
-                        "mend the pattern"
+                        "correct the pattern"
                     )
         return tuple(robot.load_of(recording.name) for recording in recordings)
 

@@ -34,13 +34,13 @@ def load_mapping(path: Path) -> dict[str, object]:
     """The mapping at the top of a YAML file.
 
     Raises:
-        InputError: the file is missing, is no YAML, has a tag or a key twice, or holds something
+        InputError: the file is missing, is not YAML, has a tag or a key twice, or holds something
             else than a mapping with names as keys.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text (byte {error.start}); save it as UTF-8") from error
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
     try:
@@ -50,9 +50,9 @@ def load_mapping(path: Path) -> dict[str, object]:
         place = f"{path} line {mark.line + 1}" if mark else str(path)
         raise InputError(f"{place}: {_reason(error)}") from error
     except yaml.YAMLError as error:
-        raise InputError(f"{path}: no YAML ({str(error).splitlines()[0]}); remove the character") from error
+        raise InputError(f"{path}: not YAML ({str(error).splitlines()[0]}); remove the character") from error
     except (RecursionError, ValueError) as error:
-        raise InputError(f"{path}: no plain YAML ({error}); write keys and numbers only") from error
+        raise InputError(f"{path}: not plain YAML ({error}); write keys and numbers only") from error
     if not isinstance(data, dict):
         found = "empty" if data is None else f"a {type(data).__name__}"
         raise InputError(f"{path}: the file is {found}, expected keys and values such as plant: wip")
@@ -76,4 +76,4 @@ def _reason(error: yaml.MarkedYAMLError) -> str:
         return f"tag {tag} is not allowed; write plain values only"
     if "given twice" in problem:
         return f"{problem}; keep one"
-    return f"no YAML ({problem}); mend the line"
+    return f"not YAML ({problem}); correct the line"

@@ -1,4 +1,4 @@
-"""Tables: CSV and Parquet files as columns of numbers, each fault with its place.
+"""Tables: CSV and Parquet files as columns of numbers, and where each error is.
 
 Only columns that are asked for are turned into numbers and checked; a log may hold text
 beside them. What the columns mean is in `wipx.recordings.signals`.
@@ -60,7 +60,8 @@ class Table(ABC):
             cell = cells[int(bad[0])]
             found = "empty" if cell is None or not str(cell).strip() else repr(str(cell))
             raise InputError(
-                f"{self.place(begin + int(bad[0]))}: {name} is {found}, expected a finite number; mend or drop the row"
+                f"{self.place(begin + int(bad[0]))}: {name} is {found}, expected a finite number; "
+                "correct or drop the row"
             )
         return values
 
@@ -80,7 +81,7 @@ class CsvTable(Table):
         for line, row in zip(lines, rows, strict=True):
             if len(row) != len(header):
                 raise InputError(
-                    f"{path} line {line}: {len(row)} cells, the header has {len(header)}; mend or drop the row"
+                    f"{path} line {line}: {len(row)} cells, the header has {len(header)}; correct or drop the row"
                 )
         super().__init__(path, header, len(rows) - 1)
         self._lines = lines[1:]
@@ -165,9 +166,9 @@ def _read_csv(path: Path) -> tuple[list[int], list[list[str]]]:
                     lines.append(reader.line_num)
                     rows.append(row)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: no UTF-8 text ({error.reason} at byte {error.start}); export it as CSV") from error
+        raise InputError(f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); export it as CSV") from error
     except csv.Error as error:
-        raise InputError(f"{path}: no comma-separated text ({error}); export it as CSV") from error
+        raise InputError(f"{path}: not comma-separated text ({error}); export it as CSV") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path and its permissions") from error
     return lines, rows
@@ -181,4 +182,4 @@ def _read_parquet(path: Path) -> "pa.Table":
         return parquet.read_table(path)
     except (pa.ArrowException, OSError) as error:
         reason = str(error).splitlines()[0]
-        raise InputError(f"{path}: no readable Parquet file ({reason}); write it again") from error
+        raise InputError(f"{path}: not a readable Parquet file ({reason}); write it again") from error

@@ -34,7 +34,7 @@ METHODS_HEAD = (
 
 @dataclass(frozen=True)
 class OptimizerScore:
-    """What one optimizer made of one problem, over seeds.
+    """Results of one optimizer on one problem, over seeds.
 
     Attributes:
         name: Of the optimizer.
@@ -67,7 +67,7 @@ def optimizer_scores(runs: Sequence[AdaptationResult], truth: Mapping[str, float
 
     Args:
         runs: Searches of the same problem.
-        truth: The robot's true numbers by name [SI]; None where nobody knows them.
+        truth: The robot's true numbers by name [SI]; None if they are not known.
     """
     best = min(run.fit.value for run in runs)
     scores = [
@@ -99,7 +99,7 @@ def optimizer_table(scores: Sequence[OptimizerScore]) -> str:
 def method_table(runs: Sequence[AdaptationResult]) -> str:
     """The reality gap of each method as a Markdown table; medians with ranges over seeds and draws."""
     pure = [run.held_out.value for run in runs if run.method == "pure_sim" and run.held_out is not None]
-    # What noise leaves shows best beside the best model: a worse one mistakes differences between trials for noise.
+    # The noise floor is best estimated with the best model: a worse one mistakes differences between trials for noise.
     floor = min((run.held_out.floor for run in runs if run.held_out is not None), default=float("nan"))
     rows = []
     for name in dict.fromkeys(run.method for run in runs):

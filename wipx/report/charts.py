@@ -1,4 +1,4 @@
-"""The numbers behind the page's charts, as plain data for its script; how they look is up to the script."""
+"""The numbers behind the page's charts, as plain data for its script; the script decides how they look."""
 
 import base64
 import math
@@ -111,7 +111,7 @@ def _errors(rows: tuple[SignalErrors, ...]) -> list[dict]:
 
 
 def wants_logarithm(values: Iterable[float], ratio: float = 10.0) -> bool:
-    """Whether values want a logarithmic axis: none negative, the largest above the least positive by `ratio`."""
+    """Whether values need a logarithmic axis: none negative, the largest above the least positive by `ratio`."""
     finite = [value for value in values if math.isfinite(value)]
     positive = [value for value in finite if value > 0.0]
     return bool(positive) and min(finite) >= 0.0 and max(positive) > ratio * min(positive)

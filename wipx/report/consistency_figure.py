@@ -38,7 +38,7 @@ def draw_consistency(series: Sequence[SizeSeries], path: Path) -> None:
             axes.set_visible(True)
             _draw(axes, one)
         line[0].set_ylabel(rig.replace(" (", "\n("), fontsize=8, color=MUTED)
-    title = "Sizes from disjoint groups of runs with 95 % intervals; dotted lines part the ways of splitting"
+    title = "Sizes from disjoint groups of runs with 95 % intervals; dotted lines separate the ways of splitting"
     figure.suptitle(f"{title}, orange: the authors' figure", x=0.01, ha="left", fontsize=10)
     write_whole(path, png(figure))
 

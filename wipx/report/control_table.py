@@ -1,8 +1,8 @@
-"""Control under unknown loads as tables: ours beside the baseline, other controllers, and what the reality gap costs.
+"""Control under unknown loads as tables: ours and the baseline, other controllers, and the effect of the reality gap.
 
 The paper's pitch error is measured from what a controller aims at, zero for its baseline; a baseline that stands still
-where the robot balances has a large one. Errors here are measured from where the robot really balances, for
-all controllers alike, and the paper's definition stands beside them.
+at the robot's true balance has a large one. Errors here are measured from the robot's true balance, for
+all controllers alike; the paper's definition is given in addition.
 """
 
 from collections.abc import Sequence
@@ -141,7 +141,7 @@ def method_rows(results: Sequence[ControlResult]) -> list[tuple[str, ...]]:
 
 
 def estimate_error(result: ControlResult) -> float:
-    """Root mean squared error of the pitches that the controller was told [rad]; NaN where it was told none."""
+    """Root mean squared error of the pitches that the controller was given [rad]; NaN if it was given none."""
     errors = [trial.estimate - trial.pitch for trial in result.trials if trial.estimate is not None]
     return float(np.sqrt(np.mean(np.square(errors)))) if errors else float("nan")
 

@@ -1,6 +1,6 @@
-"""What every page is made with: templates that escape all texts, and script, style and data inside the file.
+"""What all pages share: templates that escape all texts, and script, style and data inside the file.
 
-The pages open anywhere, also without a network.
+The pages open anywhere, without a network.
 """
 
 import json
@@ -44,7 +44,7 @@ def render(
 
 
 def _json_in_html(data: dict) -> str:
-    """JSON that cannot end the script element it stands in."""
+    """JSON that cannot close the script element that contains it."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

@@ -63,13 +63,12 @@ def _meaning(margins: Mapping[str, Margins], region: RecoveryRegion) -> str:
     inner = [name for name, found in margins.items() if found.inner]
     if inner:
         sentences.append(
-            f"Those of {' and '.join(inner)} are of the inner loop, about a balance that is held: how it is estimated "
-            "is no part of them."
+            f"Those of {' and '.join(inner)} are of the inner loop, about a fixed balance; they leave its estimate out."
         )
     sentences.append(
         f"Loads of {', '.join(masses)} kg, {compact(region.height)} m above the wheel axis, balance at "
         f"{', '.join(pitches)} rad; the robot is released upright on a rail of +-{compact(region.rail)} m. It has "
-        f"recovered where it is still on the rail and calm after {compact(region.duration)} s; it stands off by its "
-        "mean distance from x = 0 then."
+        f"recovered if it is still on the rail and calm after {compact(region.duration)} s; it then stands off by its "
+        "mean distance from x = 0."
     )
     return " ".join(sentences)

@@ -1,4 +1,4 @@
-"""The panels that pictures are put together from: signals, errors, and the look that all of them share."""
+"""The panels of which pictures consist: signals, errors, and their common style."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""The score of blind diagnoses as one HTML page and as Markdown; what the cells say is the caller's choice."""
+"""The score of blind diagnoses as one HTML page and as Markdown; the caller chooses the content of the cells."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -31,7 +31,7 @@ class Table:
         head: Names of the columns.
         rows: Cells; what follows a line break is secondary.
         numbers: Columns that are set flush right.
-        folded: Whether the page shows it only when it is asked for.
+        folded: Whether the page shows it only on demand.
     """
 
     title: str
@@ -44,7 +44,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Tile:
-    """A figure to remember.
+    """A main figure.
 
     Attributes:
         label: What it is.
@@ -112,7 +112,7 @@ class Confusions:
 
 @dataclass(frozen=True)
 class ScorePage:
-    """Everything that a reader wants to see of a blind run.
+    """The content of the page of a blind run.
 
     Attributes:
         title: Of the page.

@@ -9,7 +9,7 @@ AS_GOOD = 0.05  # relative change of the held-out error that is not told from no
 
 
 def suspect_sentence(suspect: Suspect, *, unexplained: bool) -> str:
-    """One sentence: the free size and its evidence, then what comes of the suspected size.
+    """One sentence: the free size and its evidence, then the verdict on the suspected size.
 
     Args:
         suspect: What was found; its own `sentence` is not read.
@@ -39,7 +39,7 @@ def _free_size(suspect: Suspect) -> str:
 
 
 def _suspected_size(suspect: Suspect, size: SuspectedSize, *, unexplained: bool) -> str:
-    """What comes of the suspected size, compared with what decides."""
+    """The verdict on the suspected size, compared with the model that decides."""
     units = {symbol_of(number.name): "" if number.unit == "1" else f" {number.unit}" for number in suspect.parameters}
     values = ", ".join(f"{symbol} = {compact(value)}{units[symbol]}" for symbol, value in size.values.items())
     loss, other = (size.loss_to_free, "that size") if size.against_free else (size.loss, "the answer")

@@ -92,7 +92,7 @@ def _summary(result: AdaptationResult) -> str:
     for name, loss in parts.items():
         if loss is not None:
             spread = "" if loss.low == loss.high else f" [{significant(loss.low)}, {significant(loss.high)}]"
-            lines.append(f"  {name}: {significant(loss.value)}{spread}, noise leaves {significant(loss.floor)}")
+            lines.append(f"  {name}: {significant(loss.value)}{spread}, noise floor {significant(loss.floor)}")
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""`task=rival`: what people would use in place of a diagnosis, on the same recordings and judged by the same score."""
+"""`task=baseline`: what people would use in place of a diagnosis, on the same recordings, judged by the same score."""
 
 import time
 from collections.abc import Mapping
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.baselines.case import Answer, Found, Problem, Rival
+from wipx.baselines.case import Answer, Baseline, Found, Problem
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.core.effect import Effect
 from wipx.core.plant import Plant
@@ -23,20 +23,20 @@ NETWORK = "residual.npz"
 
 
 @dataclass(frozen=True)
-class RunRival:
-    """Ask a rival about the recordings of a source."""
+class RunBaseline:
+    """Ask a baseline about the recordings of a source."""
 
     def run(self, job: Job) -> None:
-        """Write diagnosis.json, model.yaml and, of a rival that learned one, the network."""
+        """Write diagnosis.json, model.yaml and, of a baseline that learned one, the network."""
         source: RecordingSource = job.part("recordings")
         description = source.describe()
         nominal = job.part("plant").nominal(description.model)
         recordings = source.load()
         check_long_enough(recordings)
         case = Problem(recordings, nominal, description.uncertainty, job.part("sim"))
-        rival: Rival = job.part("rival")
+        baseline: Baseline = job.part("baseline")
         begun = time.perf_counter()
-        answer = rival.answer(case, np.random.default_rng(job.seed))
+        answer = baseline.answer(case, np.random.default_rng(job.seed))
         seconds = time.perf_counter() - begun
         errors = _errors(case, answer)
         content = diagnosis(answer, errors, case) | {"source": str(source.path), "seconds": seconds}
@@ -63,7 +63,7 @@ def _errors(case: Problem, answer: Answer) -> FitErrors:
 
 
 def diagnosis(answer: Answer, errors: FitErrors, case: Problem) -> dict[str, object]:
-    """What a rival can fill of diagnosis.json, contract section 5; it has no intervals and no probabilities."""
+    """What a baseline can fill of diagnosis.json, contract section 5; it has no intervals and no probabilities."""
     plant = case.nominal.plant
     total = sum(found.weight for found in answer.found) or 1.0
     sites: dict[str, float] = {}

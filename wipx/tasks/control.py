@@ -9,9 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from wipx.control.controller import Controller
-from wipx.control.equilibrium import EquilibriumLqr, EquilibriumRegulator
-from wipx.control.loop import Loop
-from wipx.control.predictive import Mpc
+from wipx.control.loop import ControlLoop
 from wipx.core.control_result import ControlResult, ControlTrial
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.hardware.target import Target
@@ -28,15 +26,12 @@ from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioNam
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 
-Design = Controller | EquilibriumLqr
-WITHIN = 0.95  # share of the rail in which a predictive controller, which knows where it ends, plans to stay
-
 
 @dataclass(frozen=True)
 class Control:
     """Drive a target by one controller in one scenario.
 
-    Model and, for `controller=lqr_equilibrium`, estimator come from the simulation of the chosen method. Every
+    Model and, for a controller that asks one, estimator come from the simulation of the chosen method. Every
     controller has the same state estimate with that model, so that they differ in nothing else.
 
     Attributes:
@@ -90,9 +85,9 @@ class Control:
             )
         with written_together(job.out) as folder:
             robots = training_set_of(self._recording(job), settings)
-            loop = self.loop(job, job.part("controller"), robots, folder)
-            trials = self._trials(target, loop)
-            result = self._result(job, robots, target, trials, estimates=isinstance(loop, EquilibriumRegulator))
+            controller: Controller = job.part("controller")
+            trials = self._trials(target, self.loop(job, controller, robots, folder))
+            result = self._result(job, robots, target, trials, estimates=controller.asks_estimator)
             _write(job, folder, result)
         _track(job, result)
         print(_summary(result))
@@ -106,7 +101,8 @@ class Control:
             if name not in target.loads:
                 raise unknown_name("load", name, target.loads, "task.loads")
         if isinstance(target, EmulatedTestbed):
-            return replace(target, rail=self._rail, step=self.step, weights=_placed(target.weights, scenario))
+            placed = replace(target, rail=self._rail, weights=_placed(target.weights, scenario))
+            return placed.stepping(self.step)
         if scenario.has_events or scenario.mirrored:
             raise InputError(
                 f"task.scenario={self.scenario} needs target=emulated; a robot can do balancing or tracking"
@@ -126,18 +122,17 @@ class Control:
 
         return replace(job, part=part, settings={**job.settings, "controller": self.recorded_with})
 
-    def loop(self, job: Job, controller: Design, robots: SimulatedRobots, folder: Path) -> Loop:
+    def loop(self, job: Job, controller: Controller, robots: SimulatedRobots, folder: Path) -> ControlLoop:
         """A controller on the adapted simulation; its estimator is trained now where it needs one.
 
         Args:
             job: Has estimator, simulator and seed.
-            controller: Of any kind.
+            controller: What drives the robot.
             robots: The simulation, and what is learned from.
             folder: Takes what the estimator keeps.
         """
-        if isinstance(controller, Mpc):
-            controller = replace(controller, rail=WITHIN * self._rail)
-        if not isinstance(controller, EquilibriumLqr):
+        controller = controller.on_rail(self._rail)
+        if not controller.asks_estimator:
             return controller.loop(robots.model)
         recipe: Recipe = job.part("estimator")
         training = robots.training.first(self.length)
@@ -145,7 +140,7 @@ class Control:
         with StageProgress("train") as progress:
             return controller.loop(robots.model, recipe.prepare(workshop, progress))
 
-    def _trials(self, target: Target, loop: Loop) -> tuple[ControlTrial, ...]:
+    def _trials(self, target: Target, loop: ControlLoop) -> tuple[ControlTrial, ...]:
         """All trials, judged as they come."""
         judge, scenario, nominal = self.judge(), SCENARIOS[self.scenario], target.nominal()
         pitches = {name: target.loads[name].equilibrium(nominal) for name in self.loads}
@@ -154,9 +149,8 @@ class Control:
         for i, name, k in tqdm(planned, desc=self.scenario, leave=False, disable=None):
             trial = scenario.trial(f"{name}_{k + 1}.csv", name)
             (recording,) = target.run([trial], loop, np.random.default_rng([self.trial_seed, i, k]))
-            estimate, notes = (loop.balance, loop.notes) if isinstance(loop, EquilibriumRegulator) else (None, ())
-            trial = judge.judged(recording, name, k + 1, pitches[name], estimate)
-            judged.append(replace(trial, notes=notes))
+            trial = judge.judged(recording, name, k + 1, pitches[name], loop.balance)
+            judged.append(replace(trial, notes=loop.notes))
         return tuple(judged)
 
     def _result(

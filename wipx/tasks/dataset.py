@@ -226,7 +226,7 @@ def _summary(training: TrainingSet, path: Path, seconds: float) -> str:
             f"training set: {path} ({sizes}; digest {card['digest']}), {seconds:.1f} s",
             f"  {card['method']} in {card['engine']}, seed {card['seed']}; balance at {pitch.min():.3f} to "
             f"{pitch.max():.3f} rad; {card['stopped']} robots fell or reached the end of the rail",
-            f"  {check['robots']} labels beside where the robots really balance: at most {off} rad off the middle of a "
+            f"  {check['robots']} labels compared with the simulated balance: at most {off} rad from the middle of a "
             f"dead band of +-{band} rad, {miss} rad outside of it",
         ]
     )

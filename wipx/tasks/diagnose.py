@@ -58,6 +58,7 @@ class Diagnose:
                 rng=np.random.default_rng(job.seed),
                 watcher=progress,
                 suspects=self.suspects,
+                rules=job.part("diagnosis"),
             )
         with written_together(job.out) as folder:
             write_diagnosis(diagnosis, folder)

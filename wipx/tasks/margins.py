@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from wipx.control.balance_watch import check_carriage
-from wipx.control.equilibrium import EquilibriumLqr
+from wipx.control.controller import Controller
 from wipx.control.margins import margins
-from wipx.control.predictive import Mpc
 from wipx.control.recovery import Releases, recovery_region
 from wipx.core.errors import InputError
 from wipx.core.margins import Margins, RecoveryRegion
@@ -18,7 +17,7 @@ from wipx.core.model import Model
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
-from wipx.tasks.control import Control, Design
+from wipx.tasks.control import Control
 from wipx.tasks.dataset import Dataset, training_set_of
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import flat, written_together
@@ -93,17 +92,14 @@ def _check_robot(job: Job) -> None:
         ) from error
 
 
-def _margins(name: str, controller: Design, model: Model) -> Margins:
+def _margins(name: str, controller: Controller, model: Model) -> Margins:
     """Margins of one controller; `inner` where it moves the balance about which it acts."""
     try:
         found = margins(controller, model)
     except InputError as error:
         reason = str(error).removeprefix("controller: ")
         raise InputError(f"task.controllers.{name}: {reason}; or leave it out, ~task.controllers.{name}") from error
-    moves = isinstance(controller, EquilibriumLqr) or (
-        isinstance(controller, Mpc) and controller.offset_free is not None
-    )
-    return replace(found, inner=moves)
+    return replace(found, inner=controller.moves_balance)
 
 
 def _write(job: Job, folder: Path, found: Mapping[str, Margins], region: RecoveryRegion) -> None:

@@ -103,7 +103,8 @@ class Pipeline:
         trials = [self._trial(k, name, nominal, rng) for k, name in enumerate(names)]
         with written_together(job.out) as folder:
             (folder / "recordings").mkdir()
-            write_robot(folder / "recordings" / "robot.yaml", nominal, controller, {})
+            feedback = controller.feedback(nominal), controller.rate
+            write_robot(folder / "recordings" / "robot.yaml", nominal, feedback, {})
             runs = target.run(trials, controller.loop(nominal), rng)
             for recording in tqdm(runs, desc="record", total=len(trials), leave=False, disable=None):
                 slow = logged_slower(recording, self.log_every)
@@ -185,8 +186,8 @@ def _of_groups(overrides: tuple[str, ...], *groups: str) -> tuple[str, ...]:
 
 
 def _group_of(override: str) -> str:
-    """Group of an override such as `+controller.rate=500`."""
-    return override.lstrip("+~").partition("=")[0].partition(".")[0]
+    """Group of an override such as `+controller.rate=500`, or of a part within one, `sim@target.engine=analytic`."""
+    return override.lstrip("+~").partition("=")[0].rpartition("@")[2].partition(".")[0]
 
 
 def logged_slower(recording: Recording, every: int) -> Recording:

@@ -4,17 +4,11 @@ import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench, slow
 
-from wipx.core.plant import plant_of
 from wipx.diagnosis.decision import confirmation, estimates
-from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape
-from wipx.diagnosis.selection.nested_laws import reduced_law
-from wipx.diagnosis.selection.search import Selection
-
-WIP = plant_of("wip")
 
 
 @pytest.mark.slow
@@ -47,29 +41,11 @@ def test_means_of_commands_may_feign_what_swings(
     assert answer.verdict == verdict  # the law of a resonance, fitted, gains nothing in either log
 
 
-def test_a_rich_law_has_a_simple_one_where_there_is_room():
-    assert reduced_law("pitch/presliding", (), WIP) == "pitch/coulomb"
-    assert reduced_law("pitch/presliding", ("translation/coulomb",), WIP) == "pitch/coulomb"
-    assert reduced_law("pitch/presliding", ("pitch/coulomb",), WIP) is None
-    assert reduced_law("pitch/sticky_spot", ("pitch/stribeck",), WIP) is None  # which excludes Coulomb friction
-    assert reduced_law("pitch/viscous", (), WIP) is None
-
-
 @pytest.mark.slow
 def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
     robot = bench("linear_axis", hidden, fresh_seed)
-    monkeypatch.setattr(Context, "heldout_gain", lambda self, repeated, reduced: 0.0)  # nothing shows
+    monkeypatch.setattr(HeldOut, "gain", lambda self, repeated, reduced: 0.0)  # nothing shows
     answer = robot.diagnosed()
     assert {effect.name for effect in answer.effects} == set(hidden)
     assert answer.verdict == "mismatch"
-
-
-def test_one_effect_takes_the_place_of_two_that_imitate_it(fresh_seed: int):
-    case = bench("wip", {"sensor_theta/scale": {"e": 0.06}}, fresh_seed)
-    selection = Selection(case.fitter, case.setting, case.fit())
-    rescaled = {"sensor_x/scale.e": -0.06, "actuator/gain.k": 1.06}  # a linear robot looks the same at another scale
-    hypothesis = Hypothesis.of(case.setting, ("sensor_x/scale", "actuator/gain"), rescaled)
-    two = case.fitter.converged(case.fitter.fit(hypothesis, selection.nominal.levels))
-    assert selection.evidence(selection.nominal, two) > 100.0
-    assert selection.exchanged(two).effects == ("sensor_theta/scale",)

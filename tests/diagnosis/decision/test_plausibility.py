@@ -16,6 +16,7 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.rules import PlausibilityRules
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.recordings.source import RecordingSource
@@ -37,7 +38,8 @@ EXAMPLES = {
     "two_effects": ("actuator/delay",),
     "pendulum": ("pitch/coulomb",),
 }
-SLIPS_OF = {kind: [mistake.undone for mistake in mistakes(nominal_model(kind))] for kind in ("wip", "pendulum")}
+RULES = PlausibilityRules()
+SLIPS_OF = {kind: [mistake.undone for mistake in mistakes(nominal_model(kind), RULES)] for kind in ("wip", "pendulum")}
 BAD_UNITS = (
     Mistake("", "body mass in g", "", parameters={"body_mass": 1e-3}),
     Mistake("", "inertia in g m^2", "", parameters={"body_inertia": 1e-3}),
@@ -91,7 +93,7 @@ def test_examples_are_plausible(name: str, examples: Path):
 def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
     model = nominal_model("wip")
     recordings = Robot(model.with_effects(MISSING["gain"])).record(np.random.default_rng(fresh_seed), 2)
-    mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
+    mistake = next(mistake for mistake in mistakes(model, RULES) if mistake.undone == undone)
     with pytest.raises(
         InputError, match=f"^robot.yaml: the recordings contradict its {mistake.contradicted} .*{undone}"
     ):
@@ -102,7 +104,7 @@ def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
 def test_mistakes_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
     model = nominal_model("pendulum")
     recordings = Robot(model.with_effects({"pitch/coulomb": {"F_c": 0.2}})).record(np.random.default_rng(fresh_seed))
-    mistake = next(mistake for mistake in mistakes(model) if mistake.undone == undone)
+    mistake = next(mistake for mistake in mistakes(model, RULES) if mistake.undone == undone)
     with pytest.raises(InputError, match=f"with {undone}"):
         checked(*with_slip(mistake, model, recordings), ("pitch/viscous",))
 
@@ -120,11 +122,11 @@ def test_numbers_in_a_wrong_unit_are_named(kind: str, mistake: Mistake, fresh_se
 @pytest.mark.parametrize("name", ["two_effects", "pendulum"])
 def test_a_reversed_command_of_an_example_is_named(name: str, examples: Path):
     model, recordings = example(examples / name)
-    mistake = mistakes(model)[0]
+    mistake = mistakes(model, RULES)[0]
     with pytest.raises(InputError, match=r"reverse it with signals: {u: {column: u, scale: -1}}"):
         checked(*with_slip(mistake, model, recordings), ("actuator/gain",))
 
 
 def test_a_sound_body_has_no_number_in_a_wrong_unit():
     for kind in ("wip", "cartpole", "pendulum", "linear_axis", "double_pendulum"):
-        assert not any(mistake.parameters for mistake in mistakes(nominal_model(kind)))
+        assert not any(mistake.parameters for mistake in mistakes(nominal_model(kind), RULES))

@@ -8,17 +8,20 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 
 
 def forecasts(case: Bench) -> ForecastFitter:
-    return ForecastFitter(case.fitter, case.quiet, case.quiet, case.setting.doubted())
+    return ForecastFitter(
+        case.fitter, case.quiet, case.quiet, case.setting.doubted(case.fitter.rules.forecasts.undeclared)
+    )
 
 
 def shaken(case: Bench, rng: np.random.Generator) -> Bench:
@@ -36,7 +39,7 @@ def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    found = Selection(fitter, case.setting, nominal).run()
+    found = Search.of(FitStore.of(fitter, case.setting, nominal), nominal).run().fit
     assert found.effects[0].startswith("translation/")
     level = next(v for name, v in found.hypothesis.values.items() if name.endswith((".F_c", ".F_s")))
     assert level == pytest.approx(1.0, rel=0.3)
@@ -46,7 +49,7 @@ def test_nothing_is_asked_for_where_the_nominal_model_is_right(fresh_seed: int):
     case = bench("linear_axis", {}, fresh_seed, count=3)
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    assert Selection(fitter, case.setting, nominal).run().effects == ()
+    assert Search.of(FitStore.of(fitter, case.setting, nominal), nominal).run().fit.effects == ()
 
 
 def test_a_mass_that_is_slightly_wrong_is_no_missing_law(fresh_seed: int):
@@ -84,8 +87,8 @@ def test_two_laws_of_one_equation_are_not_told_apart_and_friction_is_from_a_spri
         fitter.first_fit(Hypothesis.of(case.setting, (effect,), {}))
         for effect in ("translation/coulomb", "translation/presliding", "environment/spring")
     )
-    assert _separation(fitter, friction, rich) < ALIKE
-    assert _separation(fitter, friction, spring) > ALIKE
+    assert _separation(fitter, friction, rich) < fitter.rules.answer.told_apart
+    assert _separation(fitter, friction, spring) > fitter.rules.answer.told_apart
 
 
 def _separation(fitter: ForecastFitter, fit: Fit, rival: Fit) -> float:

@@ -80,6 +80,7 @@ def test_the_found_effect_leaves_nothing_over():
     assert answer.unexplained.p_value > 1e-4
 
 
+@pytest.mark.statistical(allowed=1.0 / 800)
 def test_p_values_of_a_true_model_are_spread_evenly(fresh_seed: int):
     seeds = np.random.default_rng(fresh_seed).integers(2**31, size=12)
     smallest = []

@@ -21,10 +21,10 @@ from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
 from wipx.diagnosis.decision.confirmation import Rest
-from wipx.diagnosis.decision.context import FAR_FROM_THE_FLOOR, FAR_OFF, Context
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
-from wipx.diagnosis.decision.held_out import Transfer, judged, transfer
-from wipx.diagnosis.likelihood.fitting import ALIKE, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.held_out import Transfer, judged, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import inflation
@@ -32,8 +32,9 @@ from wipx.diagnosis.next_experiment.choice import Question, next_experiment
 from wipx.diagnosis.residuals.discrepancy import curve_of
 from wipx.diagnosis.residuals.remaining_forces import horizon_errors, left_forces
 from wipx.diagnosis.residuals.residual_tests import Shape
+from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_effects, simple_law
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import effect_of
 from wipx.effects.words import effect_in_words
 from wipx.report.diagnosis_sentence import sentence
@@ -42,9 +43,9 @@ from wipx.sim.simulator import StateFeedback
 CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
 
 
-def answered(context: Context, selection: Selection, rest: Rest, shapes: list[Shape]) -> Diagnosis:
+def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) -> Diagnosis:
     """Everything a person wants to know."""
-    nominal, fit = context.setting.nominal, rest.fit
+    nominal, fit, rules = context.setting.nominal, rest.fit, context.rules
     repeated = transfer(context.fitter, fit)
     judge = context.judge
     trusted = judge.tuned(nominal, context.recordings)
@@ -52,15 +53,15 @@ def answered(context: Context, selection: Selection, rest: Rest, shapes: list[Sh
     model = replace(fit.hypothesis.model, bandwidths=(judge.bandwidths or {}) if fit.effects else nominal.bandwidths)
     held_out, traces = judged(judge, trusted, repeated.models, context.recordings)
     fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
-    ends = estimates(context.fitter, fit, selection.nominal)
-    effects = _effects(context, selection, rest, repeated, ends, shapes)
+    ends = estimates(context.fitter, fit, search.nominal)
+    effects = _effects(context, search, rest, repeated, ends, shapes)
     wrong = not context.is_quiet(fit) or context.is_worse(fit)
-    left = rest.significant or (fitted.times_the_floor > FAR_OFF and wrong)
-    matters = left and fitted.times_the_floor > FAR_FROM_THE_FLOOR
+    left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
+    matters = left and fitted.times_the_floor > rules.trust.near_floor
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(context, rest), significant=left)
-    as_one = () if rest.significant else combined(context, selection, fit)
-    before, after = (context.fitter.seen_by_row(each)[1] for each in (selection.nominal, fit))
+    as_one = () if rest.significant else combined(context, search, fit)
+    before, after = (context.fitter.seen_by_row(each)[1] for each in (search.nominal, fit))
     location = located(context.by_row, before, after, effects, unexplained.site)
     draft = Diagnosis(
         title="",
@@ -76,9 +77,9 @@ def answered(context: Context, selection: Selection, rest: Rest, shapes: list[Sh
         fit=fitted,
         held_out=held_out,
         unexplained=unexplained,
-        candidates=tuple(_in_hindsight(candidate, fit) for candidate in selection.considered),
-        bounds=bounds(selection.candidates_for(fit), context.data.plant),
-        weak=(*_weak(effects), *_as_one(as_one, nominal.plant.kind)),
+        candidates=tuple(_in_hindsight(candidate, fit) for candidate in rest.considered),
+        bounds=bounds(search.store.candidates_for(fit), context.data.plant),
+        weak=(*_weak(effects, rules.answer.wide), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
         traces=traces,
         notes=(),
@@ -99,7 +100,9 @@ def _remainder(
         {name: held_out.completed[name] / floor for name, floor in floors.items()},
         matters,
         horizon_errors(traces),
-        left_forces(context.by_row.simulator, context.data, context.judge.noise, model),
+        left_forces(
+            context.by_row.simulator, context.data, context.judge.noise, model, context.rules.residuals.telling
+        ),
     )
 
 
@@ -110,20 +113,20 @@ def _in_hindsight(candidate: ConsideredEffect, fit: Fit) -> ConsideredEffect:
 
 def _effects(
     context: Context,
-    selection: Selection,
+    search: Search,
     rest: Rest,
     repeated: Transfer,
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> tuple[FoundEffect, ...]:
     fit = rest.fit
-    reduced = {effect: context.reduced(selection, fit, effect) for effect in fit.effects}
-    gains = {effect: max(selection.evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
+    reduced = {effect: search.store.reduced(fit, effect) for effect in fit.effects}
+    gains = {effect: max(evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
     total = sum(gains.values()) or 1.0
     found = []
     for effect in sorted(fit.effects, key=lambda e: -gains[e]):
         law = effect_of(effect, context.data.plant)
-        rivals, probability = _rivals(context, selection, fit, effect)
+        rivals, probability = _rivals(context, search, fit, effect)
         found.append(
             FoundEffect(
                 effect,
@@ -131,10 +134,10 @@ def _effects(
                 law.source,
                 law.outside_vocabulary,
                 tuple(e for e in ends if e.name.startswith(f"{effect}.")),
-                tuple(rival.name for rival in rivals if rival.separation < ALIKE),
+                tuple(rival.name for rival in rivals if rival.separation < context.rules.answer.told_apart),
                 rivals,
                 gains[effect],
-                context.heldout_gain(repeated, reduced[effect]),
+                context.held_out.gain(repeated, reduced[effect]),
                 probability,
                 gains[effect] / total,
                 law_curve(context.by_row, _taken_out(context, fit, effect), fit, effect, shapes),
@@ -146,33 +149,31 @@ def _effects(
 def _taken_out(context: Context, fit: Fit, effect: str) -> Fit:
     """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
     rest = tuple(e for e in fit.effects if e != effect)
-    hypothesis = Hypothesis.of(context.setting_of(fit), rest, fit.hypothesis.values)
+    hypothesis = Hypothesis.of(context.setting.with_curve_of(fit.hypothesis), rest, fit.hypothesis.values)
     found = context.by_row.fit(hypothesis, context.fitter.seen_by_row(fit)[1].levels, steps=0)
     return replace(found, jacobian=found.jacobian[:, :0])
 
 
-def _rivals(context: Context, selection: Selection, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
+def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
     """Effects that could stand in the place of one, the closest first, and the probability of its name."""
     overstated = inflation(fit, fit.hypothesis.parameters_of(effect))
     rivals, weights = [], []
     rest = set(fit.effects) - {effect}
-    base = context.reduced(selection, fit, effect)
-    for other in selection.replacements(fit, effect):
+    base = search.store.reduced(fit, effect)
+    for other in search.store.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
         if name == effect or _is_richer(other, name, effect, context.data):
             continue
         starts = _starts(context, fit, other, effect, name)
         start = context.fitter.likeliest(starts, fit.levels, 1)[0]
-        close = selection.evidence(other, fit) < max(
-            context.fitter.close_call, CLOSE_SHARE * selection.evidence(base, fit)
-        )
+        close = evidence(other, fit) < max(context.fitter.close_call, CLOSE_SHARE * evidence(base, fit))
         if close or start is not starts[0]:
             again = context.fitter.converged(context.fitter.fit(start, fit.levels))
             other = max(other, again, key=lambda found: found.log_likelihood)
-        loss = selection.evidence(base, fit) - selection.evidence(base, other)
+        loss = evidence(base, fit) - evidence(base, other)
         values = {k.rpartition(".")[2]: v for k, v in other.hypothesis.values.items() if k.startswith(f"{name}.")}
         rivals.append(Alternative(name, context.fitter.separation(fit, other, loss, overstated), values))
-        weights.append(np.exp(min(selection.score(other, base) - selection.score(fit, base), 0.0) / overstated))
+        weights.append(np.exp(min(score(other, base) - score(fit, base), 0.0) / overstated))
     rivals.sort(key=lambda rival: rival.separation)
     return tuple(rivals), float(1.0 / (1.0 + sum(weights)))
 
@@ -189,7 +190,7 @@ def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> l
     theirs = [p for p in fit.hypothesis.space.free if p.name.startswith(f"{effect}.")]
     if len(mine) == len(theirs) == 1 and mine[0].unit == theirs[0].unit:
         values.append({**shared, mine[0].name: shared[theirs[0].name]})
-    return [Hypothesis.of(context.setting_of(fit), rival.effects, each) for each in values]
+    return [Hypothesis.of(context.setting.with_curve_of(fit.hypothesis), rival.effects, each) for each in values]
 
 
 def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
@@ -220,11 +221,11 @@ def _unexplained(context: Context, rest: Rest) -> Unexplained:
     return Unexplained(True, rest.p_value, site, words, rest.resembles, curve)
 
 
-def _weak(effects: tuple[FoundEffect, ...]) -> tuple[str, ...]:
+def _weak(effects: tuple[FoundEffect, ...], wide: float) -> tuple[str, ...]:
     found = []
     for effect in effects:
         for p in effect.parameters:
-            if is_wide(p):
+            if is_wide(p, wide):
                 found.append(f"{p.name} is known to {p.low:.3g} ... {p.high:.3g} {p.unit} only")
         for name in effect.equivalent:
             found.append(f"{effect.name} cannot be told from {name}")
@@ -249,7 +250,7 @@ def _units(context: Context) -> dict[str, str]:
 
 def proposed(
     context: Context,
-    selection: Selection,
+    search: Search,
     fit: Fit,
     answer: Diagnosis,
     feedback: tuple[StateFeedback, float] | None,
@@ -260,10 +261,12 @@ def proposed(
     rivals = [
         other
         for effect, name in tied
-        for other in selection.replacements(fit, effect)
+        for other in search.store.replacements(fit, effect)
         if name in other.effects and effect not in other.effects
     ]
-    weak = tuple(p.name for effect in answer.effects for p in effect.parameters if is_wide(p))
+    weak = tuple(
+        p.name for effect in answer.effects for p in effect.parameters if is_wide(p, context.rules.answer.wide)
+    )
     if not rivals and not weak:
         return None
     questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
@@ -272,4 +275,6 @@ def proposed(
     closed, rate = feedback if feedback is not None else (None, context.recordings[0].rate)
     simulator = context.by_row.simulator
     answered_by_row = context.fitter.seen_by_row(fit)[1]
-    return next_experiment(question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng)
+    return next_experiment(
+        question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng, context.rules
+    )

@@ -3,12 +3,10 @@
 import numpy as np
 
 from wipx.core.recording import Recording
-
-GAP = 1.5  # usual time steps, beyond which rows are missing
-UNEVEN = 0.05  # of the usual time step, by which others vary
+from wipx.diagnosis.rules import USUAL, AnswerRules
 
 
-def caveats(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
+def caveats(recordings: tuple[Recording, ...], rules: AnswerRules = USUAL.answer) -> tuple[str, ...]:
     """One sentence for each: a single recording, missing rows, uneven time steps."""
     said = []
     if len(recordings) == 1:
@@ -16,7 +14,8 @@ def caveats(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
             f"There is one recording only, {recordings[0].name}: what differs from run to run cannot show, "
             "and what is held out is a part of the same run."
         )
-    missing = {one.name: _missing(one) for one in recordings if _missing(one)}
+    missing = {one.name: _missing(one, rules.gap) for one in recordings}
+    missing = {name: rows for name, rows in missing.items() if rows}
     if missing:
         worst = max(missing, key=lambda name: missing[name])
         whole = next(len(one) for one in recordings if one.name == worst) + missing[worst]
@@ -24,7 +23,8 @@ def caveats(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
             f"Rows are missing in {len(missing)} of {len(recordings)} recordings, most in {worst} "
             f"({missing[worst]} of {whole}); the command before a gap counts as held through it."
         )
-    uneven = {one.name: _unevenness(one) for one in recordings if _unevenness(one) > UNEVEN}
+    uneven = {one.name: _unevenness(one, rules.gap) for one in recordings}
+    uneven = {name: varied for name, varied in uneven.items() if varied > rules.uneven}
     if uneven:
         worst = max(uneven, key=lambda name: uneven[name])
         said.append(
@@ -34,13 +34,13 @@ def caveats(recordings: tuple[Recording, ...]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _missing(recording: Recording) -> int:
+def _missing(recording: Recording, gap: float) -> int:
     """Rows that the gaps of a recording have room for."""
     steps = np.diff(recording.t) * recording.rate
-    return int(np.sum(np.rint(steps[steps > GAP]) - 1.0))
+    return int(np.sum(np.rint(steps[steps > gap]) - 1.0))
 
 
-def _unevenness(recording: Recording) -> float:
+def _unevenness(recording: Recording, gap: float) -> float:
     """Standard deviation of the time steps without gaps, relative to the usual one."""
     steps = np.diff(recording.t) * recording.rate
-    return float(np.std(steps[steps <= GAP]))
+    return float(np.std(steps[steps <= gap]))

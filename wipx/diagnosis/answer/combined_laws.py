@@ -10,13 +10,11 @@ from wipx.core.diagnosis import Combined
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import kind_of, kinds
 
-TOLD_APART = 4.5  # nats of three standard deviations, from which recordings tell two explanations apart
 
-
-def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined, ...]:
+def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]:
     """Laws that explain an effect of a fit and a constant force as well as these two."""
     found = []
     values = fit.hypothesis.values
@@ -26,8 +24,8 @@ def combined(context: Context, selection: Selection, fit: Fit) -> tuple[Combined
             start = {**values, **{f"{name}.{own}": values[f"{effect}.{other}"] for own, other in symbols.items()}}
             hypothesis = Hypothesis.of(context.setting, (*rest, name), start)
             other = context.fitter.converged(context.fitter.fit(hypothesis, context.fitter.escape_levels(fit)))
-            lead = selection.score(other, selection.nominal) - selection.score(fit, selection.nominal)
-            if lead > -TOLD_APART:
+            lead = search.criteria.score_lead(other, fit)
+            if lead > -0.5 * context.rules.answer.told_apart**2:
                 parameters = {symbol: other.hypothesis.values[f"{name}.{symbol}"] for symbol in symbols}
                 found.append(Combined(name, (effect, constant), lead, parameters))
     return tuple(found)

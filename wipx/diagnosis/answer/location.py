@@ -15,12 +15,11 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import motion_of
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.rules import AnswerRules
 from wipx.effects.catalogue import kind_of
 
 BINS = 24  # of a map, along each axis
 RUN_BINS = 40  # along each recording
-CONCENTRATED = 0.6  # share of the excess from which an interval is told
-FEW_ROWS = 0.3  # share of the rows up to which it is one
 
 
 def excess_of(fitter: InnovationFitter, nominal: Fit, completed: Fit) -> np.ndarray:
@@ -46,7 +45,9 @@ def located(
     excess = excess_of(fitter, nominal, completed)
     data = fitter.data
     signals = motion_of(fitter, nominal)
-    regions = _named_regions(effects, signals, excess, data) or _found_regions(signals, excess, data)
+    regions = _named_regions(effects, signals, excess, data) or _found_regions(
+        signals, excess, data, fitter.rules.answer
+    )
     return Location(_sites(effects, rest), regions, _periods(effects, excess, data), _map(data, signals, excess))
 
 
@@ -98,19 +99,21 @@ def _share(excess: np.ndarray, inside: np.ndarray, data: RecordingBatch) -> floa
     return float(np.clip(excess[data.counted & inside].sum() / total, 0.0, 1.0)) if total > 0.0 else 0.0
 
 
-def _found_regions(signals: Mapping[str, np.ndarray], excess: np.ndarray, data: RecordingBatch) -> tuple[Region, ...]:
+def _found_regions(
+    signals: Mapping[str, np.ndarray], excess: np.ndarray, data: RecordingBatch, rules: AnswerRules
+) -> tuple[Region, ...]:
     """The interval of a signal that holds most of the excess in few rows, if one does."""
     best: tuple[float, Region] | None = None
     for name, values in signals.items():
         if name == "t":
             continue
-        found = _interval(name, values[data.counted], excess[data.counted])
+        found = _interval(name, values[data.counted], excess[data.counted], rules)
         if found is not None and (best is None or found[0] > best[0]):
             best = found
     return () if best is None else (best[1],)
 
 
-def _interval(name: str, values: np.ndarray, excess: np.ndarray) -> tuple[float, Region] | None:
+def _interval(name: str, values: np.ndarray, excess: np.ndarray, rules: AnswerRules) -> tuple[float, Region] | None:
     total = float(excess.sum())
     if total <= 0.0:
         return None
@@ -125,7 +128,8 @@ def _interval(name: str, values: np.ndarray, excess: np.ndarray) -> tuple[float,
     for i in range(len(edges) - 1):
         for j in range(i + 1, len(edges)):
             share, few = held[j] - held[i], rows[j] - rows[i]
-            if share >= CONCENTRATED and few <= FEW_ROWS and (best is None or share - few > best[0]):
+            told = share >= rules.concentrated and few <= rules.few_rows
+            if told and (best is None or share - few > best[0]):
                 best = (share - few, Region(name, float(edges[i]), float(edges[j]), float(min(share, 1.0))))
     return best
 

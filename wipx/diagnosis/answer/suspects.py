@@ -21,18 +21,18 @@ from wipx.diagnosis.candidates.screening import candidates_beside
 from wipx.diagnosis.decision.confirmation import Rest
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import estimates
-from wipx.diagnosis.decision.held_out import transfer
 from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.held_out import transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.residuals.discrepancy import with_curve
+from wipx.diagnosis.selection.criteria import evidence
+from wipx.diagnosis.selection.fit_store import STARTS
 from wipx.diagnosis.selection.nested_laws import reduced_values, simple_law
-from wipx.diagnosis.selection.search import STARTS, Selection
+from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import check_together, effect_of, vocabulary
 from wipx.recordings.model_file import model_from_mapping
 from wipx.report.suspect_sentence import suspect_sentence
-
-CONFIDENCE = 0.95  # with which a size is excluded
 
 Suspected = Mapping[str, Mapping[str, float]]
 
@@ -80,19 +80,17 @@ def _check_bounds(name: str, effect: Effect, values: Mapping[str, float], scales
             )
 
 
-def asked(
-    context: Context, selection: Selection, rest: Rest, answer: Diagnosis, suspects: Suspected
-) -> tuple[Suspect, ...]:
+def asked(context: Context, search: Search, rest: Rest, answer: Diagnosis, suspects: Suspected) -> tuple[Suspect, ...]:
     """What the recordings say of each suspect.
 
     Args:
         context: The means.
-        selection: The search that led to the answer.
+        search: The search that led to the answer.
         rest: The answer's fit.
         answer: The answer, complete.
         suspects: As `check_suspects` returns them.
     """
-    return tuple(_Asked(context, selection, rest, answer, name).about(values) for name, values in suspects.items())
+    return tuple(_Asked(context, search, rest, answer, name).about(values) for name, values in suspects.items())
 
 
 @dataclass(frozen=True)
@@ -100,38 +98,40 @@ class _Asked:
     """One suspect and what it is compared with."""
 
     context: Context
-    selection: Selection
+    search: Search
     rest: Rest
     answer: Diagnosis
     name: str
 
     def about(self, values: Mapping[str, float]) -> Suspect:
         """What the recordings say, also of these values by symbol where there are any."""
-        context, selection = self.context, self.selection
+        context, search = self.context, self.search
         named = self.name in self.rest.fit.effects
         replaced = () if named else self.making_room()
         gone = (self.name,) if named else replaced
-        base = context.reduced(selection, self.rest.fit, *gone) if gone else self.rest.fit
+        base = search.store.reduced(self.rest.fit, *gone) if gone else self.rest.fit
         free = self.rest.fit if named else self.free_size(base, values)
         base = self.refitted_from(base, free)
         best = self.refitted_from(self.rest.fit, free)
         repeated = transfer(context.fitter, free)
         known = context.fitter.by_recording(base, base.white)
-        numbers = estimates(context.fitter, free, selection.nominal)
+        numbers = estimates(context.fitter, free, search.nominal)
         suspect = Suspect(
             name=self.name,
             named=named,
             in_place_of=replaced,
             parameters=tuple(e for e in numbers if e.name.startswith(f"{self.name}.")),
-            log_evidence_gain=selection.evidence(base, free),
-            required_gain=selection.required_gain(base, free),
-            heldout_gain=context.heldout_gain(repeated, base),
+            log_evidence_gain=evidence(base, free),
+            required_gain=search.criteria.required_gain(base, free),
+            heldout_gain=context.held_out.gain(repeated, base),
             transfers=bool(repeated.likelihoods.sum() > known.sum()),
-            loss=0.0 if named else -selection.evidence(best, free),
+            loss=0.0 if named else -evidence(best, free),
             size=None,
         )
         if values:
-            limit = 0.5 * chdtri(len(values), 1.0 - CONFIDENCE) * _overstated(free, numbers, self.name)
+            limit = (
+                0.5 * chdtri(len(values), 1.0 - context.rules.answer.confidence) * _overstated(free, numbers, self.name)
+            )
             suspect = replace(suspect, size=self.of_size(suspect, values, free, best, float(limit)))
         unexplained = self.answer.unexplained.significant
         return replace(suspect, sentence=suspect_sentence(suspect, unexplained=unexplained))
@@ -155,7 +155,7 @@ class _Asked:
         if effect_of(self.name, self.context.data.plant).outside_vocabulary:
             looked_at = candidates_beside(self.context.fitter, self.context.setting, base, outside_vocabulary=True)
         else:
-            looked_at = self.selection.candidates_for(base)
+            looked_at = self.search.store.candidates_for(base)
         promising = [candidate.values for candidate in looked_at if candidate.effect == self.name][:STARTS]
         suspected = {f"{self.name}.{symbol}": value for symbol, value in values.items()}
         simple = {k: v for k, v in reduced_values(self.rest.fit).items() if k.startswith(f"{self.name}.")}
@@ -166,16 +166,16 @@ class _Asked:
         self, suspect: Suspect, values: Mapping[str, float], free: Fit, best: Fit, limit: float
     ) -> SuspectedSize:
         """What comes of a suspected size, by symbol."""
-        context, selection = self.context, self.selection
+        context = self.context
         setting = context.setting
         nominal = setting.nominal.with_effects({self.name: values})
         others = tuple(effect for effect in free.effects if effect != self.name)
         starts = [free.hypothesis.values, best.hypothesis.values]
         held = self.likeliest(replace(setting, nominal=nominal), others, starts, free.levels)
-        loss, loss_to_free = -selection.evidence(best, held), -selection.evidence(free, held)
+        loss, loss_to_free = -evidence(best, held), -evidence(free, held)
         against_free = suspect.supported or bool(suspect.in_place_of)
         inside = all(_covers(number, values) for number in suspect.parameters)
-        ours, theirs = (context.heldout_error(transfer(context.fitter, fit)) for fit in (held, self.rest.fit))
+        ours, theirs = (context.held_out.error(transfer(context.fitter, fit)) for fit in (held, self.rest.fit))
         return SuspectedSize(
             dict(values),
             loss,
@@ -191,7 +191,7 @@ class _Asked:
     ) -> Fit:
         """The likeliest fit of some effects; a curve that stands in is taken as it is, or drawn anew beside them."""
         fitter, rest = self.context.fitter, self.rest
-        curves = self.context.setting_of(rest.fit).nominal.effects
+        curves = self.context.setting.with_curve_of(rest.fit.hypothesis).nominal.effects
         kept = replace(setting, nominal=setting.nominal.with_effects({**curves, **setting.nominal.effects}))
         fits = [fitter.fit(Hypothesis.of(kept, effects, start), levels, steps=5) for start in starts]
         best = fitter.converged(max(fits, key=lambda fit: fit.log_likelihood))

@@ -1,39 +1,28 @@
 """What becomes of the effects that the selection chose: which are kept, and what stands in for what they leave over."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from wipx.core.diagnosis import ConsideredEffect
 from wipx.diagnosis.candidates.screening import candidates_beside
-from wipx.diagnosis.decision.context import FAR_OFF, TOLERATED, Context
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import deviations
-from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import LEAST_GAIN, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.discrepancy import with_curve
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests, shapes_of
+from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import extended_effects
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.search import Chosen, History, Search
 from wipx.effects.catalogue import effect_of
 
-SIGNIFICANT = 1e-4  # p value, corrected, of a residual where nothing is named
-BESIDE_EFFECTS = 1e-3  # and beside effects: where something was missing, more of it is less of a surprise
-RESIDUAL_GAIN = 20.0  # nats that a residual must be worth
-SWING_GAIN = 15.0  # and a resonance, which has three numbers where a curve has nine
-RESIDUAL_SHARE = 0.02  # and of what is explained
-BESIDE_MEANS = 1.5  # times as much where the log has means of commands only, which answer to noise within a row
-DOUBTFUL = 50.0  # nats below which an effect that does not transfer is dropped
-CERTAIN = 3.0  # standard deviations by which a size must differ from nothing
-IRRELEVANT = 0.1  # of the noise floor, a change of predictions that does not matter
+BEYOND = 3  # laws from beyond the vocabulary that are fitted
 RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
-GIVEN_UP = 0.1  # of that effect's gain, that they may lack
-MINOR = 0.25  # of what the leading effect gains, below which an effect must show in held-out predictions
-SMALL_PRINT = 150.0  # nats; what gains more is no misfit of another law
-VISIBLE = 0.05  # of the squared error of held-out predictions, that it must remove
 
 
 @dataclass(frozen=True)
@@ -47,6 +36,7 @@ class Rest:
         significant: Whether it is something.
         resembles: Effects beyond the vocabulary that would explain it.
         spread: Standard deviation of the stand-in at its knots [force or share]; empty where there is none.
+        considered: What was looked at on the way, in order.
     """
 
     fit: Fit
@@ -55,76 +45,79 @@ class Rest:
     significant: bool
     resembles: tuple[str, ...]
     spread: np.ndarray
+    considered: History = ()
+
+    def after(self, history: History) -> "Rest":
+        """The same, with what was considered before."""
+        return replace(self, considered=history + self.considered)
 
 
-def decided(context: Context, selection: Selection, chosen: Fit) -> tuple[Rest, list[Shape]]:
+def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, list[Shape]]:
     """What is kept of the effects that the selection chose, what they leave over, and the shapes it was looked for in.
 
     Small effects that held-out predictions do not show are kept where something is left without them and nothing
     with them: what is left is then no misfit of another law.
     """
-    told = len(selection.considered)
-    kept = confirmed(context, selection, chosen)
-    shapes = shapes_of(context.by_row, kept)
-    rest = remaining(context, selection, kept, shapes)
-    if not rest.significant or len(kept.effects) == len(chosen.effects):
-        return rest, shapes
-    dropped = selection.considered[told:]
-    del selection.considered[told:]
-    more = confirmed(context, selection, chosen, visible=-np.inf)
-    if set(more.effects) > set(kept.effects):
-        whole = remaining(context, selection, more, shapes)
-        if not whole.significant:
-            return whole, shapes
-    selection.considered[told:] = dropped
-    return rest, shapes
+    kept = confirmed(context, search, chosen.fit)
+    shapes = shapes_of(context.by_row, kept.fit)
+    rest = remaining(context, search, kept.fit, shapes).after(kept.considered)
+    if rest.significant and len(kept.fit.effects) < len(chosen.fit.effects):
+        more = confirmed(context, search, chosen.fit, small=True)
+        if set(more.fit.effects) > set(kept.fit.effects):
+            whole = remaining(context, search, more.fit, shapes)
+            if not whole.significant:
+                rest = whole.after(more.considered)
+    return rest.after(chosen.considered), shapes
 
 
-def confirmed(context: Context, selection: Selection, fit: Fit, visible: float = VISIBLE) -> Fit:
+def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
     """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
 
     Args:
         context: The means.
-        selection: The search that chose the effects.
+        search: The search that chose the effects.
         fit: Of the effects.
-        visible: Share of the squared error of held-out predictions that a small effect must remove.
+        small: Whether small effects are kept that held-out predictions do not show.
     """
     if not fit.effects:
-        return fit
+        return Chosen(fit)
     repeated = transfer(context.fitter, fit)
     predicted = np.concatenate(context.judge.predict(fit.hypothesis.model, context.recordings))
-    without = {effect: selection.without(fit, effect) for effect in fit.effects}
-    gains = {effect: selection.evidence(without[effect], fit) for effect in fit.effects}
+    without = {effect: search.store.without(fit, effect) for effect in fit.effects}
+    gains = {effect: evidence(without[effect], fit) for effect in fit.effects}
     leading = max(gains, key=lambda effect: gains[effect])
-    uncertain = _uncertain(context, selection, fit)
+    uncertain = _uncertain(context, search, fit)
+    rules = context.rules.confirmation
+    least = min(rules.minor * gains[leading], rules.most_misfit)
     for effect in reversed(fit.effects):
         reduced, gain = without[effect], gains[effect]
         change = predicted - np.concatenate(context.judge.predict(reduced.hypothesis.model, context.recordings))
         known = context.fitter.by_recording(reduced, reduced.white)
         # An effect that gains much and does not transfer points to something else that is missing.
-        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < IRRELEVANT * context.judge.noise):
+        if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < rules.irrelevant * context.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in uncertain and (gain < SMALL_PRINT or not nonsmooth_search.is_non_smooth(fit)):
+        elif effect in uncertain and (gain < rules.most_misfit or not nonsmooth_search.is_non_smooth(fit)):
             reason = "has a size that cannot be told from zero"
-        elif gain < DOUBTFUL and float(np.sum(repeated.likelihoods - known)) <= 0.0:
+        elif gain < rules.doubtful and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif gain < min(MINOR * gains[leading], SMALL_PRINT) and context.heldout_gain(repeated, reduced) < visible:
+        elif not small and gain < least and context.held_out.gain(repeated, reduced) < rules.visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
-            rival = _rival_that_transfers(context, selection, fit, effect, repeated, gain)
-            if rival is not None:
-                reason = "held-out recordings contradict it, and not what is in its place"
-                selection.considered.append(ConsideredEffect(effect, gain, False, reason))
-                return confirmed(context, selection, rival, visible)
-            continue
-        selection.considered.append(ConsideredEffect(effect, gain, False, reason))
-        plain = selection.with_reduced_law(fit, effect)
-        worth = plain is not None and selection.gains_enough(reduced, plain)
-        return confirmed(context, selection, plain if plain is not None and worth else reduced, visible)
-    return fit
+            rival = _rival_that_transfers(context, search, fit, effect, repeated, gain)
+            if rival is None:
+                continue
+            reason = "held-out recordings contradict it, and not what is in its place"
+            considered = (ConsideredEffect(effect, gain, False, reason),)
+            return confirmed(context, search, rival, small=small).after(considered)
+        considered = (ConsideredEffect(effect, gain, False, reason),)
+        plain = search.store.with_reduced_law(fit, effect)
+        worth = plain is not None and search.criteria.gains_enough(reduced, plain)
+        kept = plain if plain is not None and worth else reduced
+        return confirmed(context, search, kept, small=small).after(considered)
+    return Chosen(fit)
 
 
-def _uncertain(context: Context, selection: Selection, fit: Fit) -> list[str]:
+def _uncertain(context: Context, search: Search, fit: Fit) -> list[str]:
     """Effects none of whose sizes is known to differ from nothing.
 
     Beside chance, halving the simulator's step may move a size by as much as it is, and innovations that stay coloured
@@ -132,7 +125,7 @@ def _uncertain(context: Context, selection: Selection, fit: Fit) -> list[str]:
     """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     size = np.abs(cube - space.neutral)
-    known = size > CERTAIN * deviations(context.fitter, fit, selection.nominal)
+    known = size > context.rules.confirmation.certain * deviations(context.fitter, fit, search.nominal)
     found = []
     for effect in fit.effects:
         law = effect_of(effect, fit.hypothesis.model.plant)
@@ -143,49 +136,56 @@ def _uncertain(context: Context, selection: Selection, fit: Fit) -> list[str]:
 
 
 def _rival_that_transfers(
-    context: Context, selection: Selection, fit: Fit, effect: str, repeated: Transfer, gain: float
+    context: Context, search: Search, fit: Fit, effect: str, repeated: Transfer, gain: float
 ) -> Fit | None:
     """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
-    if context.heldout_gain(repeated, selection.without(fit, effect)) >= -TOLERATED:
+    rules = context.rules.confirmation
+    if context.held_out.gain(repeated, search.store.without(fit, effect)) >= -rules.tolerated:
         return None
-    error = context.heldout_error(repeated)
-    for other in selection.replacements(fit, effect)[:RIVALS]:
-        if set(other.effects) != set(fit.effects) and selection.evidence(other, fit) < GIVEN_UP * gain:
+    error = context.held_out.error(repeated)
+    for other in search.store.replacements(fit, effect)[:RIVALS]:
+        if set(other.effects) != set(fit.effects) and evidence(other, fit) < rules.given_up * gain:
             again = context.fitter.converged(context.fitter.fit(other.hypothesis, fit.levels))
-            if context.heldout_error(transfer(context.fitter, again)) < (1.0 - VISIBLE) * error:
+            if context.held_out.error(transfer(context.fitter, again)) < (1.0 - rules.visible) * error:
                 return again
     return None
 
 
-def remaining(context: Context, selection: Selection, fit: Fit, shapes: list[Shape]) -> Rest:
+def remaining(context: Context, search: Search, fit: Fit, shapes: list[Shape]) -> Rest:
     """What the named effects leave over, and a stand-in for it."""
-    explained = fit.motion_likelihood - selection.nominal.motion_likelihood
+    explained = fit.motion_likelihood - search.nominal.motion_likelihood
     least = _least_gains(context, fit, explained)
-    other = _other_law(context, selection, fit, least["force"])
-    if other is not None:
-        return other
+    other, considered = _other_law(context, search, fit, least["force"])
+    if other is None:
+        other = _left_over(context, search, fit, shapes, least)
+    return other.after(considered)
+
+
+def _left_over(context: Context, search: Search, fit: Fit, shapes: list[Shape], least: Mapping[str, float]) -> Rest:
+    """What the named effects leave over, where no law from beyond the vocabulary takes the place of one."""
+    explained = fit.motion_likelihood - search.nominal.motion_likelihood
     left, p_value = significant_residuals(context, fit, explained, shapes)
     if not left and not _is_far_off(context, fit):
         return Rest(fit, None, p_value, False, (), np.zeros(0))
     strongest = max(left, key=lambda residual: residual.gain) if left else None
     worth = least["force"] if strongest is None else least[strongest.shape.kind]
-    resembles, named = _beyond(context, selection, fit, worth)
+    resembles, named = _beyond(context, fit, worth)
     if strongest is None:
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
     forces = [residual for residual in left if residual.shape.kind != "resonance"]
     if not forces:
         if named is None and context.data.has_means:  # which feign what swings; its law does not confirm it
             return Rest(fit, None, p_value, False, (), np.zeros(0))
-        named = fit if named is None else _without_superfluous(context, selection, named)
+        named = fit if named is None else _without_superfluous(search, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     widest = max(forces, key=lambda residual: residual.gain)
     stood_in, spread = with_curve(context.by_row, context.setting, fit, widest)
     if named is not None and named.log_likelihood > stood_in.log_likelihood:
-        named = _without_superfluous(context, selection, named)
+        named = _without_superfluous(search, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     for effect in fit.effects:
-        if selection.evidence(context.reduced(selection, stood_in, effect), stood_in) < LEAST_GAIN:
-            return remaining(context, selection, selection.without(fit, effect), shapes)
+        if evidence(search.store.reduced(stood_in, effect), stood_in) < context.rules.selection.least_gain:
+            return remaining(context, search, search.store.without(fit, effect), shapes)
     return Rest(stood_in, widest, p_value, True, resembles, spread)
 
 
@@ -203,14 +203,17 @@ def significant_residuals(
     found = residual_tests(context.by_row, fit, shapes)
     p_value = min(1.0, min(residual.p_value for residual in found) * len(shapes))
     least = _least_gains(context, fit, explained)
-    return _significant(found, p_value, least, BESIDE_EFFECTS if fit.effects else SIGNIFICANT), p_value
+    rules = context.rules.residuals
+    return _significant(found, p_value, least, rules.level_beside_effects if fit.effects else rules.level), p_value
 
 
 def _least_gains(context: Context, fit: Fit, explained: float) -> dict[str, float]:
     """What a residual of each kind must gain beside a fit that explains so much [nats]."""
-    share = (nonsmooth_search.SHARE if nonsmooth_search.is_non_smooth(fit) else RESIDUAL_SHARE) * explained
-    factor = BESIDE_MEANS if context.data.has_means else 1.0
-    curve, swing = factor * max(RESIDUAL_GAIN, share), factor * max(SWING_GAIN, share)
+    rules = context.rules.residuals
+    least_share = context.rules.selection.nonsmooth_share if nonsmooth_search.is_non_smooth(fit) else rules.least_share
+    share = least_share * explained
+    factor = rules.beside_means if context.data.has_means else 1.0
+    curve, swing = factor * max(rules.least_gain, share), factor * max(rules.least_swing, share)
     return {"force": curve, "friction": curve, "gain": curve, "resonance": swing}
 
 
@@ -221,25 +224,30 @@ def _significant(found: list[Residual], p_value: float, least: Mapping[str, floa
     return [left for left in found if left.p_value < level and left.gain >= least[left.shape.kind]]
 
 
-def _beyond(context: Context, selection: Selection, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
+def _beyond(context: Context, fit: Fit, worth: float) -> tuple[tuple[str, ...], Fit | None]:
     """Effects beyond the vocabulary that explain what is left, and the fit with the best of them."""
     ranked = candidates_beside(context.fitter, context.setting, fit, outside_vocabulary=True)
     best: dict[str, Fit] = {}
+    promising = context.rules.residuals.promising
     for candidate in ranked:
-        if candidate.gain < 0.3 * ranked[0].gain or candidate.gain < 0.3 * worth or len(best) == 3:
+        if candidate.gain < promising * ranked[0].gain or candidate.gain < promising * worth or len(best) == BEYOND:
             break
         if candidate.effect not in best:
             values = {**fit.hypothesis.values, **candidate.values}
             hypothesis = Hypothesis.of(context.setting, (*fit.effects, candidate.effect), values)
             best[candidate.effect] = context.fitter.converged(context.fitter.fit(hypothesis, fit.levels), rounds=2)
     good = {name: found for name, found in best.items() if found.log_likelihood - fit.log_likelihood > worth}
-    ordered = sorted(good, key=lambda name: -selection.score(good[name], fit))
+    ordered = sorted(good, key=lambda name: -score(good[name], fit))
     return tuple(ordered), good[ordered[0]] if ordered else None
 
 
-def _other_law(context: Context, selection: Selection, fit: Fit, worth: float) -> Rest | None:
-    """What remains with a law from beyond the vocabulary in the place of a named one; None if that gains little."""
+def _other_law(context: Context, search: Search, fit: Fit, worth: float) -> tuple[Rest | None, History]:
+    """What remains with a law from beyond the vocabulary in the place of a named one; None if that gains little.
+
+    And the laws that were considered.
+    """
     best, most = None, worth
+    considered: History = ()
     for effect in fit.effects:
         law = extended_effects(fit, effect)
         if law is not None:
@@ -247,29 +255,28 @@ def _other_law(context: Context, selection: Selection, fit: Fit, worth: float) -
             begins = [Hypothesis.of(context.setting, effects, start) for start in starts]
             start = context.fitter.likeliest(begins, fit.levels, 1)[0]
             found = context.fitter.converged(context.fitter.fit(start, fit.levels), rounds=2)
-            gain = selection.evidence(fit, found)
+            gain = evidence(fit, found)
             taken = gain > most
             reason = f"explains {'more' if taken else 'hardly more'} in the place of {effect}"
-            selection.considered.append(ConsideredEffect(effects[-1], gain, taken, reason))
+            considered += (ConsideredEffect(effects[-1], gain, taken, reason),)
             if taken:
                 best, most = found, gain
     if best is None:
-        return None
+        return None, considered
     p_value = float(chdtrc(len(best.hypothesis.cube) - len(fit.hypothesis.cube), 2.0 * most))
-    best = _without_superfluous(context, selection, best)
-    return Rest(best, None, p_value, True, (best.effects[-1],), np.zeros(0))
+    best = _without_superfluous(search, best)
+    return Rest(best, None, p_value, True, (best.effects[-1],), np.zeros(0)), considered
 
 
 def _is_far_off(context: Context, fit: Fit) -> bool:
     """Whether predictions are much worse than sensor noise makes them."""
-    return context.errors(fit).times_the_floor > FAR_OFF
+    return context.errors(fit).times_the_floor > context.rules.trust.far_off
 
 
-def _without_superfluous(context: Context, selection: Selection, fit: Fit) -> Fit:
+def _without_superfluous(search: Search, fit: Fit) -> Fit:
     """Without effects that one from beyond the vocabulary has made superfluous."""
     for effect in fit.effects[:-1]:
-        rest = tuple(e for e in fit.effects if e != effect)
-        smaller = selection.fitted(rest, fit)
-        if not selection.gains_enough(smaller, fit):
-            return _without_superfluous(context, selection, smaller)
+        smaller = search.store.without(fit, effect)
+        if not search.criteria.gains_enough(smaller, fit):
+            return _without_superfluous(search, smaller)
     return fit

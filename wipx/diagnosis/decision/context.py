@@ -6,27 +6,17 @@ import numpy as np
 
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON, FitErrors
-from wipx.diagnosis.decision.held_out import Transfer, transfer
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.held_out import HeldOut
+from wipx.diagnosis.likelihood.hypothesis import Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.rules import Rules
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
-
-FAR_OFF = 5.0  # times the noise floor, errors from which predictions count as far off
-FAR_FROM_THE_FLOOR = 2.5  # times what sensor noise makes of a right model's predictions
-# Noise of a joint's force, over the usual force of that joint [s^0.5], that innovations may ask for where laws hold. In
-# half a second it does less than a thousandth of what that force does. Of 37 exact robots none has more than 3.7e-4.
-QUIET = 5e-4
-# Ratio of errors beyond which a model is wrong: of those from states that trust it to those from the best states (of 24
-# exact robots one is at 1.51, the others below 1.4), and of its own to the nominal model's.
-DISTRUSTED = 1.5
-TOLERATED = 0.05  # by which squared errors of held-out predictions may grow with a fifth effect or a later one
 
 
 @dataclass(frozen=True)
@@ -50,14 +40,16 @@ class Context:
     recordings: tuple[Recording, ...]
 
     @classmethod
-    def of(cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator) -> "Context":
+    def of(
+        cls, recordings: tuple[Recording, ...], setting: Setting, simulator: AnalyticSimulator, rules: Rules
+    ) -> "Context":
         """The means for recordings of a robot."""
         plant = setting.nominal.plant
         data = RecordingBatch.of(recordings, plant)
         noise = sensor_noise(recordings, plant)
         rates = [_rate_noise(recordings, plant.rates[c - data.joints]) for c in data.channels if c >= data.joints]
         levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
-        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal))
+        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
 
     def trusting(self, fit: Fit) -> "Context":
@@ -76,29 +68,36 @@ class Context:
         if not self.is_quiet(fit):
             return False
         errors = self.errors(fit)
-        if errors.times_the_floor <= FAR_FROM_THE_FLOOR:
+        if errors.times_the_floor <= self.rules.trust.near_floor:
             return True
         if self.is_worse(fit):
             return False
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
-        return all(others[name] <= DISTRUSTED * error for name, error in errors.completed.items())
+        return all(others[name] <= self.rules.trust.distrusted * error for name, error in errors.completed.items())
 
     def is_quiet(self, fit: Fit) -> bool:
         """Whether a fit asks for no forces but those of its laws, row by row."""
         levels = self.fitter.seen_by_row(fit)[1].levels
         usual = np.array([self.setting.scales[site].force for site in self.data.plant.joints])
-        return bool(np.all(levels.force <= QUIET * usual))
+        return bool(np.all(levels.force <= self.rules.trust.quiet * usual))
 
     def is_worse(self, fit: Fit) -> bool:
         """Whether a fit predicts the recordings far worse than the nominal model, though it was fitted to them."""
         errors = self.errors(fit)
-        return any(error > DISTRUSTED * errors.nominal[name] for name, error in errors.completed.items())
+        return any(
+            error > self.rules.trust.distrusted * errors.nominal[name] for name, error in errors.completed.items()
+        )
 
     def errors(self, fit: Fit) -> FitErrors:
         """Errors of the nominal model and of a fit on the recordings."""
         return self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
+
+    @property
+    def rules(self) -> Rules:
+        """What decides."""
+        return self.fitter.rules
 
     @property
     def data(self) -> RecordingBatch:
@@ -110,47 +109,10 @@ class Context:
         """Whether any command ever changes."""
         return bool(np.ptp(self.data.inputs.commands, axis=0).max() > 0.0)
 
-    def transfers(self, smaller: Fit, larger: Fit) -> bool:
-        """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
-        return self.heldout_gain(transfer(self.fitter, larger), smaller) > -TOLERATED
-
-    def heldout_gain(self, repeated: Transfer, reduced: Fit) -> float:
-        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
-        before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings))
-        return 1.0 - self.heldout_error(repeated) / before if before > 0.0 else 0.0
-
-    def heldout_error(self, repeated: Transfer) -> float:
-        """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
-        folds = zip(repeated.models, self.recordings, strict=True)
-        return self._squared_error([self.judge.predict(model, (recording,))[0] for model, recording in folds])
-
-    def reduced(self, selection: Selection, fit: Fit, *gone: str) -> Fit:
-        """The fit without some of its effects, its stand-in kept."""
-        rest = tuple(e for e in fit.effects if e not in gone)
-        setting = self.setting_of(fit)
-        if setting is self.setting:
-            return selection.fitted(rest, fit) if rest else selection.nominal
-        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
-        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
-
-    def setting_of(self, fit: Fit) -> Setting:
-        """The robot, with the stand-in of a fit where it has one."""
-        model = fit.hypothesis.space.model
-        extra = {
-            name: values
-            for name, values in model.effects.items()
-            if name not in fit.effects and name not in self.setting.nominal.effects
-        }
-        if not extra:
-            return self.setting
-        return Setting(self.setting.nominal.with_effects(extra), self.setting.uncertainty, self.setting.scales)
-
-    def _squared_error(self, predicted: list[np.ndarray]) -> float:
-        columns = self.data.plant.coordinates
-        return sum(
-            float(np.nansum(((coordinates - recording.stack(columns)) / self.judge.noise) ** 2))
-            for recording, coordinates in zip(self.recordings, predicted, strict=True)
-        )
+    @property
+    def held_out(self) -> HeldOut:
+        """Judges fits by recordings that they were not fitted to."""
+        return HeldOut(self.judge, self.recordings)
 
 
 def _rate_noise(recordings: tuple[Recording, ...], column: str) -> float:

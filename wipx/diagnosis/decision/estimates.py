@@ -16,24 +16,21 @@ from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
 
-LAW_MISFIT = 5e-4  # share of the evidence that a law may miss though it is the right one; widens intervals
-UNFELT = 1e-3  # standard deviations that innovations change over the whole range of a number
 NUDGE = 0.05  # relative change of the spread, to see what it does
-WIDE = 0.3  # relative half width of an interval from which a number is called weak
 
 
 def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     """Every number of a fit with its 95 % interval."""
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     values = space.to_values(cube)
-    moving = scatter_of(fit, fitter.runs)
+    moving = scatter_of(fit, fitter.runs, fitter.rules.answer.moves)
     between = np.array([moving[i].deviation if i in moving else 0.0 for i in range(len(cube))])
     deviation = np.hypot(deviations(fitter, fit, nominal), between)
     as_good = alike(fitter, fit, _explained(fit, nominal))
     low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
     high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
     # A number without any influence may be anything.
-    blind = np.sqrt(np.diag(fit.information)) < UNFELT if len(cube) else np.zeros(0, dtype=bool)
+    blind = np.sqrt(np.diag(fit.information)) < fitter.rules.answer.unfelt if len(cube) else np.zeros(0, dtype=bool)
     return tuple(
         Estimate(
             p.name,
@@ -65,7 +62,7 @@ def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
     if not len(fit.hypothesis.cube):
         return np.zeros(0)
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
-    wider = np.sqrt(1.0 + 2.0 * LAW_MISFIT * _explained(fit, nominal))
+    wider = np.sqrt(1.0 + 2.0 * fitter.rules.answer.law_misfit * _explained(fit, nominal))
     chance = wider * np.sqrt(np.diag(covariance(fit)))
     doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
     return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
@@ -92,9 +89,9 @@ def bounds(looked_at: list[Candidate], plant: Plant) -> tuple[Bound, ...]:
     return tuple(bound for _, bound in sharpest.values())
 
 
-def is_wide(p: Estimate) -> bool:
-    """Whether the interval of a number is wide beside the number itself."""
-    return 0.5 * (p.high - p.low) > WIDE * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
+def is_wide(p: Estimate, wide: float) -> bool:
+    """Whether the half width of a number's interval is more than a share `wide` of the number itself."""
+    return 0.5 * (p.high - p.low) > wide * max(abs(p.value), abs(p.value - p.nominal) if p.nominal < 1e6 else 0.0)
 
 
 def _whole_turns(name: str, value: float) -> float:

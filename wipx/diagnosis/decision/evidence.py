@@ -13,11 +13,12 @@ import numpy as np
 
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
-from wipx.diagnosis.likelihood.fitting import ALIKE, LEAST_GAIN, Fit
+from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Chosen, Search
 
 
 @dataclass(frozen=True)
@@ -26,32 +27,33 @@ class Found:
 
     Attributes:
         context: The means, with the evidence that decided.
-        selection: The search.
+        search: The search.
         rest: The final fit, and what it leaves over.
         shapes: In which that was looked for.
     """
 
     context: Context
-    selection: Selection
+    search: Search
     rest: Rest
     shapes: list[Shape]
 
 
-def found(context: Context, selection: Selection, chosen: Fit) -> Found:
+def found(context: Context, search: Search, chosen: Chosen) -> Found:
     """What is missing, by the evidence that suits the recordings.
 
     Args:
         context: The means, with innovations as evidence.
-        selection: The search by innovations.
+        search: The search by innovations.
         chosen: What it chose.
     """
-    context = context.trusting(chosen)
-    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.levels, context.setting.doubted())
-    rest, shapes = decided(context, selection, chosen)
-    by_row = Found(context, selection, rest, shapes)
+    context = context.trusting(chosen.fit)
+    doubted = context.setting.doubted(context.rules.forecasts.undeclared)
+    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, doubted)
+    rest, shapes = decided(context, search, chosen)
+    by_row = Found(context, search, rest, shapes)
     if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
         return by_row
-    ahead, agrees = _by_forecasts(context, fitter, chosen)
+    ahead, agrees = _by_forecasts(context, fitter, chosen.fit)
     if rest.significant:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row
@@ -73,7 +75,7 @@ def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
     seen = fitter.seen_ahead(rest.fit)
     numbers = len(rest.fit.hypothesis.cube) + len(rest.spread) - len(other.hypothesis.cube)
     lead = seen.log_likelihood - other.log_likelihood - 0.5 * numbers * float(np.log(fitter.rows))
-    return fitter.separation(seen, other, lead, 1.0) > ALIKE
+    return fitter.separation(seen, other, lead, 1.0) > fitter.rules.answer.told_apart
 
 
 def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
@@ -81,21 +83,24 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
 
     A second search starts from what innovations chose; the better end counts.
     """
-    setting = context.setting
+    setting, least_gain = context.setting, context.rules.selection.least_gain
     ahead = replace(context, fitter=fitter)
     nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
-    selection = Selection(fitter, setting, nominal)
-    best = selection.run()
+    search = Search.of(FitStore.of(fitter, setting, nominal), nominal)
+    criteria = search.criteria
+    best = search.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
-    same = selection.pruned(fitter.converged(fitter.fit(start, best.levels))) if chosen.effects else nominal
-    if not selection.gains_enough(nominal, same):
-        same = nominal
-    if set(same.effects) != set(best.effects) and selection.lead(same, best) > 0.0:
-        best = selection.exchanged(same)
-    hardly = set(same.effects) == set(best.effects) or selection.lead(best, same) < LEAST_GAIN
+    same = nominal
+    if chosen.effects:
+        pruned = search.pruned(fitter.converged(fitter.fit(start, best.fit.levels)))
+        best = Chosen(best.fit, best.considered + pruned.considered)
+        same = pruned.fit if criteria.gains_enough(nominal, pruned.fit) else nominal
+    if set(same.effects) != set(best.fit.effects) and criteria.lead(same, best.fit) > 0.0:
+        best = search.exchanged(same).after(best.considered)
+    hardly = set(same.effects) == set(best.fit.effects) or criteria.lead(best.fit, same) < least_gain
     agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
-    ahead = ahead.trusting(best)
-    return Found(ahead, selection, *_left_over(ahead, selection, best)), agrees
+    ahead = ahead.trusting(best.fit)
+    return Found(ahead, search, *_left_over(ahead, search.nominal, best)), agrees
 
 
 def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:
@@ -104,10 +109,10 @@ def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) 
     return [one for one in left if one.shape.kind != "resonance" or not context.data.has_means], p_value
 
 
-def _left_over(context: Context, selection: Selection, fit: Fit) -> tuple[Rest, list[Shape]]:
+def _left_over(context: Context, nominal: Fit, chosen: Chosen) -> tuple[Rest, list[Shape]]:
     """What forecasts leave over, as innovations show it."""
-    by_row, seen = context.fitter.seen_by_row(fit)
+    by_row, seen = context.fitter.seen_by_row(chosen.fit)
     shapes = shapes_of(by_row, seen)
-    left, p_value = _left_by_row(context, seen, context.fitter.seen_by_row(selection.nominal)[1], shapes)
+    left, p_value = _left_by_row(context, seen, context.fitter.seen_by_row(nominal)[1], shapes)
     strongest = max(left, key=lambda residual: residual.gain) if left else None
-    return Rest(fit, strongest, p_value, bool(left), (), np.zeros(0)), shapes
+    return Rest(chosen.fit, strongest, p_value, bool(left), (), np.zeros(0), chosen.considered), shapes

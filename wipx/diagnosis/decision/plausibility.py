@@ -22,21 +22,16 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.diagnosis.selection.search import Selection
+from wipx.diagnosis.rules import PlausibilityRules
+from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
-from wipx.sim.analytic import AnalyticSimulator
 
 PROBE_SPAN = 3.0  # [s] of a recording; a gross error shows in every second of it
 PROBE_RECORDINGS = 4
 ROUNDS = 3  # of noise levels and values in turn
-OVERWHELMING = 0.05  # nats for every recorded value: errors from row to row 5 % smaller throughout
 QUIET_FORCE = 1e-3  # of a joint's forces, where the search for the noise begins [s^0.5]
-GYRATION = (0.01, 4.0)  # body inertia over m_b L^2 of bodies that people build
-RUN_AWAY = 0.01  # share of rows in which a model is nowhere near the recording
-LEAST_MOTION = 0.005  # [m, rad] that a recorded robot travels
-HARMLESS = 0.3  # logarithm of a factor below which a wrong unit makes no gross difference
 
 
 @dataclass(frozen=True)
@@ -75,12 +70,12 @@ class Mistake:
         """Whether it leaves motion and model as they are."""
         return not self.parameters and set(self.columns) <= set(data.plant.commands)
 
-    def leaves_motion(self, data: RecordingBatch) -> bool:
-        """Whether the coordinates still move noticeably once it is put right; a unit that is right is no mistake."""
+    def leaves_motion(self, data: RecordingBatch, least: float) -> bool:
+        """Whether the coordinates still travel so far [m, rad] once it is put right; a right unit is no mistake."""
         for column, (factor, _) in self.columns.items():
             if column in data.plant.coordinates:
                 travel = max(float(np.ptp(r[column])) for r in data.recordings)
-                if abs(factor) * travel < LEAST_MOTION:
+                if abs(factor) * travel < least:
                     return False
         return True
 
@@ -103,9 +98,10 @@ def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, be
     Raises:
         InputError: a sign, a unit or a zero is wrong; the message says which and how to mend it.
     """
-    data = fitter.data
-    probe = _Case.of(fitter.simulator, _probed(data.recordings), setting, nominal.levels)
-    possible = [mistake for mistake in mistakes(setting.nominal) if mistake.leaves_motion(data)]
+    data, rules = fitter.data, fitter.rules.plausibility
+    probe = _Case.of(fitter, _probed(data.recordings), setting, nominal.levels)
+    described = mistakes(setting.nominal, rules)
+    possible = [mistake for mistake in described if mistake.leaves_motion(data, rules.least_motion)]
     mended = [(probe.without(mistake), mistake) for mistake in possible]
     case, mistake = max(mended, key=lambda pair: pair[0].nominal_likelihood)
     if case.nominal_likelihood <= probe.nominal_likelihood:
@@ -113,18 +109,18 @@ def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, be
     believed = max(probe.nominal_likelihood, probe.likelihood_with(best))
     gain = (case.best_likelihood() - believed) / probe.values
     predicts = not mistake.is_of_commands(data) or case.relative_error < probe.relative_error
-    if gain > OVERWHELMING and predicts:
+    if gain > rules.overwhelming and predicts:
         raise InputError(
             f"{where}: the recordings contradict its {mistake.contradicted} (with {mistake.undone} the model's errors "
             f"from row to row are {np.exp(-gain):.2g} times what the best missing effect leaves); {mistake.remedy}"
         )
 
 
-def mistakes(nominal: Model) -> tuple[Mistake, ...]:
+def mistakes(nominal: Model, rules: PlausibilityRules) -> tuple[Mistake, ...]:
     """The mistakes that are possible for a robot."""
     plant = nominal.plant
-    found = [*_signs(plant), *_units_of_columns(nominal), *_zeros(plant), *_units_of_parameters(nominal)]
-    return tuple(found)
+    units = (*_units_of_columns(nominal, rules), *_zeros(plant), *_units_of_parameters(nominal, rules))
+    return (*_signs(plant), *units)
 
 
 def _signs(plant: Plant) -> list[Mistake]:
@@ -145,7 +141,7 @@ def _reversed(column: str) -> Mistake:
     return Mistake(f"sign of {column}", f"{column} reversed", remedy, columns)
 
 
-def _units_of_columns(nominal: Model) -> list[Mistake]:
+def _units_of_columns(nominal: Model, rules: PlausibilityRules) -> list[Mistake]:
     plant = nominal.plant
     found = []
     angles = [column for column in plant.coordinates if column != "x"]
@@ -159,7 +155,7 @@ def _units_of_columns(nominal: Model) -> list[Mistake]:
         columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
         found.append(Mistake("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
     radius = nominal.parameters.get("wheel_radius", 1.0)
-    if "x" in plant.coordinates and abs(np.log(radius)) > HARMLESS:
+    if "x" in plant.coordinates and abs(np.log(radius)) > rules.harmless:
         remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
         found.append(Mistake("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
     return found
@@ -174,7 +170,7 @@ def _zeros(plant: Plant) -> list[Mistake]:
     return [Mistake(f"zero of {column}, which is {zero}", f"0 taken for {other}", remedy, {column: (1.0, np.pi)})]
 
 
-def _units_of_parameters(nominal: Model) -> list[Mistake]:
+def _units_of_parameters(nominal: Model, rules: PlausibilityRules) -> list[Mistake]:
     wrong = (
         ("body_mass", 1e-3, "g", "kg"),
         ("body_inertia", 1e-3, "g m^2", "kg m^2"),
@@ -189,17 +185,18 @@ def _units_of_parameters(nominal: Model) -> list[Mistake]:
         value = factor * nominal.parameters[name]
         remedy = f"write {name}: {value:.5g} if it is in {taken}"
         mistake = Mistake(f"{name}, {expected}", f"{taken} read", remedy, parameters={name: factor})
-        if _is_a_body(mistake.model(nominal)):
+        if _is_a_body(mistake.model(nominal), rules):
             found.append(mistake)
     return found
 
 
-def _is_a_body(model: Model) -> bool:
+def _is_a_body(model: Model, rules: PlausibilityRules) -> bool:
     """Whether inertia, mass and height could belong to one body; a mistake leaves them decades apart."""
     p = model.parameters
     if "body_inertia" not in p:
         return False
-    return GYRATION[0] < p["body_inertia"] / (p["body_mass"] * p["com_height"] ** 2) < GYRATION[1]
+    gyration = p["body_inertia"] / (p["body_mass"] * p["com_height"] ** 2)
+    return rules.least_gyration < gyration < rules.most_gyration
 
 
 def _probed(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
@@ -227,14 +224,14 @@ class _Case:
     @classmethod
     def of(
         cls,
-        simulator: AnalyticSimulator,
+        like: InnovationFitter,
         recordings: tuple[Recording, ...],
         setting: Setting,
         levels: NoiseLevels,
         density: float = 0.0,
     ) -> "_Case":
         data = RecordingBatch.of(recordings, setting.nominal.plant)
-        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal))
+        fitter = InnovationFitter(InnovationsModel.of(like.simulator, data, setting.nominal), like.rules)
         return cls(fitter, setting, _polished(fitter, Hypothesis.of(setting, (), {}), levels), levels, density)
 
     @property
@@ -266,7 +263,7 @@ class _Case:
         if self.nominal is None:
             return -np.inf
         try:
-            extended = Selection(self.fitter, self.setting, self.nominal).extensions(self.nominal)
+            extended = FitStore.of(self.fitter, self.setting, self.nominal).extensions(self.nominal)
         except np.linalg.LinAlgError:
             extended = []
         return max(self._likelihood(fit) for fit in (self.nominal, *extended))
@@ -282,7 +279,7 @@ class _Case:
         levels = NoiseLevels(force, self.levels.sensor * factors)
         density = int(data.counted.sum()) * float(np.log(factors).sum())
         mended = Setting(model, self.setting.uncertainty, scales)
-        return _Case.of(self.fitter.simulator, recordings, mended, levels, density)
+        return _Case.of(self.fitter, recordings, mended, levels, density)
 
     def _likelihood(self, fit: Fit | None) -> float:
         return -np.inf if fit is None else fit.log_likelihood + self.density
@@ -303,4 +300,4 @@ def _runs_away(fitter: InnovationFitter, fit: Fit) -> bool:
     batch = fit.hypothesis.space.batch(fit.hypothesis.cube)
     gains = innovations_model.gains(levels, fit.hypothesis.model)
     innovations = innovations_model.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
-    return float(np.mean(np.abs(innovations) >= LARGEST)) > RUN_AWAY
+    return float(np.mean(np.abs(innovations) >= LARGEST)) > fitter.rules.plausibility.run_away

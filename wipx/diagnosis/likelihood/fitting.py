@@ -17,6 +17,7 @@ from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.rules import EvidenceRules, Rules
 from wipx.sim.analytic import AnalyticSimulator
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ LARGEST_STEP = 0.02
 SECANT = 0.3  # standard deviations over which later slopes are taken
 DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
 SETTLED = 0.05  # nats per step at which a refinement ends
-LEAST_GAIN = 8.0  # nats beyond the penalty, that an effect must gain in any case: odds of 3000 to 1
-ALIKE = 3.0  # standard deviations below which recordings do not tell two effects apart
 CONVERGED = 0.5  # nats at which alternating ends
 
 
@@ -103,21 +102,23 @@ class Fitter(ABC):
 
     Attributes:
         considered: Effects that are fitted in each step of a search, at most.
-        promising: Share of the best expected gain below which an effect is not fitted.
-        worthless: Expected gain below which none is [nats].
         steps: Levenberg-Marquardt steps from each start of an effect.
-        unproven: Effects that need not transfer to held-out recordings, at most.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
-        richer_by: Lead that a rich law must have over the simple one that it contains [nats].
     """
 
     considered: ClassVar[int]
-    promising: ClassVar[float]
-    worthless: ClassVar[float]
     steps: ClassVar[int]
-    unproven: ClassVar[int]
     close_call: ClassVar[float]
-    richer_by: ClassVar[float]
+
+    @property
+    @abstractmethod
+    def rules(self) -> Rules:
+        """What decides."""
+
+    @property
+    @abstractmethod
+    def own_rules(self) -> EvidenceRules:
+        """Those of this kind of evidence."""
 
     @abstractmethod
     def looks_for(self, name: str, effect: Effect) -> bool:

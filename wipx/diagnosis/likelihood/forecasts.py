@@ -23,11 +23,12 @@ from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON
-from wipx.diagnosis.likelihood.fitting import CONVERGED, LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import CONVERGED, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.rules import EvidenceRules, Rules
 from wipx.effects.catalogue import vocabulary
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
@@ -41,11 +42,9 @@ STRIDE = 0.25  # [s] from one start to the next
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 LEAD = 0.1  # [s] of smoothed states before a start
 BLOCK = 1.0  # [s] of the stretches whose errors count as independent of each other
-LEVEL = 0.1  # at which any effect is named by chance
 TAILS = 5.0  # degrees of freedom of the errors' distribution
 ROUNDS = 12  # of the search for their covariance
 DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are fitted
-MATTERS = 0.05  # nats for each prediction: as if its error at one horizon became 5 % smaller
 PARTS = 6  # of the stretches, each predicted by numbers that suit the others
 DAMPED = 1e-3  # relative, of the step to these numbers
 STEPS = (1.0, 0.3)  # shares of it that are tried; none of it where neither is an improvement
@@ -97,12 +96,8 @@ class ForecastFitter(Fitter):
     """
 
     considered = 12
-    promising = 0.0
-    worthless = -np.inf
     steps = 3
-    unproven = 0
     close_call = 20.0
-    richer_by = 8.0
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
     by_row: InnovationFitter
@@ -111,6 +106,16 @@ class ForecastFitter(Fitter):
     doubted: Setting
     _doubts: dict[tuple[tuple[str, ...], bytes], np.ndarray] = field(default_factory=dict, compare=False, repr=False)
     _seen: dict[tuple[tuple[str, ...], bytes], Fit] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def rules(self) -> Rules:
+        """What decides."""
+        return self.by_row.rules
+
+    @property
+    def own_rules(self) -> EvidenceRules:
+        """Those of forecasts."""
+        return self.rules.forecasts
 
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
@@ -205,11 +210,11 @@ class ForecastFitter(Fitter):
         effects that are looked at together. In long recordings it must also matter, not only be certain.
         """
         kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
-        count = len(kept)
+        count, rules = len(kept), self.rules.forecasts
         looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.data.plant).items())
-        reach = -float(stdtrit(count - 1, LEVEL / looked_at))
+        reach = -float(stdtrit(count - 1, min(rules.level / looked_at, 0.5)))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
-        return float(kept.sum()) >= max(LEAST_GAIN, chance, MATTERS * self.rows)
+        return float(kept.sum()) >= max(self.rules.selection.least_gain, chance, rules.matters * self.rows)
 
     def _by_stretch(self, values: np.ndarray) -> np.ndarray:
         """Sums of what predictions have (N,), over each stretch of time in which any counts."""

@@ -10,7 +10,6 @@ from wipx.core.parameters import Scales
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
 
-UNDECLARED = 0.015  # relative standard deviation of a rigid body's numbers that are listed as exact
 GIVEN = ("gravity",)  # numbers that are exact
 
 
@@ -36,9 +35,21 @@ class Setting:
             return ParameterSpace(prepared, ())
         return parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
 
-    def doubted(self) -> "Setting":
-        """The same robot, none of whose numbers is quite exact: those of a real machine never are."""
-        body = {name: UNDECLARED for name, value in self.nominal.parameters.items() if value and name not in GIVEN}
+    def with_curve_of(self, hypothesis: "Hypothesis") -> "Setting":
+        """The robot with the curve that stands in for what a hypothesis leaves over, where it has one."""
+        effects, known = hypothesis.space.model.effects, (*hypothesis.effects, *self.nominal.effects)
+        curve = {name: values for name, values in effects.items() if name not in known}
+        return replace(self, nominal=self.nominal.with_effects(curve)) if curve else self
+
+    def doubted(self, deviation: float) -> "Setting":
+        """The same robot, none of whose numbers is quite exact: those of a real machine never are.
+
+        Args:
+            deviation: Relative standard deviation of a rigid body's numbers that are given as exact.
+        """
+        if deviation == 0.0:
+            return self
+        body = {name: deviation for name, value in self.nominal.parameters.items() if value and name not in GIVEN}
         return replace(self, uncertainty={**body, **self.uncertainty})
 
 

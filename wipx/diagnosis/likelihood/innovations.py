@@ -12,13 +12,14 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import CONVERGED, LEAST_GAIN, Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import CONVERGED, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, whitened
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import stretches
+from wipx.diagnosis.rules import USUAL, EvidenceRules, Rules
 from wipx.effects.catalogue import kind_of
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -26,24 +27,29 @@ LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
 LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
 SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
-LEAST_SHARE = 0.01  # of what is explained already
-MOST_ASKED = 80.0  # nats that the share asks for, at most
 LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
 
 
 @dataclass(frozen=True)
 class InnovationFitter(Fitter):
-    """Fits hypotheses to innovations."""
+    """Fits hypotheses to innovations.
+
+    Attributes:
+        innovations_model: Of the recordings.
+        rules: What decides.
+    """
 
     considered = 6
-    promising = 0.05
-    worthless = 3.0
     steps = 5
-    unproven = 4  # small ones easily fill up what nothing explains
     close_call = 60.0
-    richer_by = 4.0
 
     innovations_model: InnovationsModel
+    rules: Rules = USUAL
+
+    @property
+    def own_rules(self) -> EvidenceRules:
+        """Those of innovations."""
+        return self.rules.innovations
 
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3."""
@@ -76,19 +82,20 @@ class InnovationFitter(Fitter):
 
     def refined(self) -> "InnovationFitter":
         """The same with half the step of the simulator."""
-        return InnovationFitter(
-            replace(self.innovations_model, simulator=replace(self.simulator, step=0.5 * self.simulator.step))
-        )
+        finer = replace(self.simulator, step=0.5 * self.simulator.step)
+        return replace(self, innovations_model=replace(self.innovations_model, simulator=finer))
 
     def without(self, *recordings: int) -> "InnovationFitter":
         """The same with recordings that do not count."""
-        return InnovationFitter(replace(self.innovations_model, data=replace(self.data, left_out=recordings)))
+        data = replace(self.data, left_out=recordings)
+        return replace(self, innovations_model=replace(self.innovations_model, data=data))
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
-        share = nonsmooth_search.SHARE if nonsmooth_search.leaves_open(smaller, added) else LEAST_SHARE
-        return max(LEAST_GAIN, min(share * explained, MOST_ASKED))
+        rules = self.rules.selection
+        share = rules.nonsmooth_share if nonsmooth_search.leaves_open(smaller, added) else rules.least_share
+        return max(rules.least_gain, min(share * explained, rules.most_asked))
 
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Always: where laws hold, their likelihood says all."""

@@ -26,9 +26,6 @@ PEAKS = 4  # from which a fit starts
 LEAST = 0.02  # of the search interval, that a number counts at least
 TRIALS = 40  # at each width
 FACTORS = np.geomspace(1.0 / 8.0, 8.0, 10)  # along the ridge, that are looked at for as good a fit
-CHANCE = 1.92  # nats, half of the 95 % quantile of chi squared with one degree of freedom
-SHARE = 0.05  # of what is explained, that a law leaves open which others follow roughly only
-MOST = 80.0  # nats of it
 
 
 def leaves_open(fit: Fit, added: Sequence[str]) -> bool:
@@ -114,7 +111,8 @@ def alike(fitter: Fitter, fit: Fit, explained: float) -> np.ndarray:
     if is_non_smooth(fit):
         space = fit.hypothesis.space
         _, ridge, powers = _numbers(fit)
-        least = fit.log_likelihood - float(np.clip(SHARE * explained, CHANCE, MOST))
+        rules, chance = fitter.rules.selection, fitter.rules.answer.as_good
+        least = fit.log_likelihood - float(np.clip(rules.nonsmooth_share * explained, chance, rules.most_asked))
         for factor in FACTORS:
             values = space.to_values(fit.hypothesis.cube)
             values[ridge] *= factor**powers

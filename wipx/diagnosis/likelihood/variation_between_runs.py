@@ -13,7 +13,6 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.sandwich import sums_over
 
 UNSEEN = 1e-6  # information below which a recording says nothing of a number
-MOVES = 1e-3  # p value below which a number that stays is no explanation
 
 
 @dataclass(frozen=True)
@@ -31,12 +30,13 @@ class Scatter:
     high: float
 
 
-def scatter_of(fit: Fit, runs: np.ndarray) -> dict[int, Scatter]:
+def scatter_of(fit: Fit, runs: np.ndarray, level: float) -> dict[int, Scatter]:
     """Numbers that move, by index.
 
     Args:
         fit: Of several recordings.
         runs: Number of the recording of every white error, shape of `Fit.white`.
+        level: p value below which a number that stays is no explanation.
     """
     if not len(fit.hypothesis.cube):
         return {}
@@ -54,21 +54,21 @@ def scatter_of(fit: Fit, runs: np.ndarray) -> dict[int, Scatter]:
     found = {}
     for i in np.flatnonzero(fit.free):
         seen = information[:, i] > UNSEEN
-        scatter = _scatter(shifts[seen, i], variances[seen, i], len(labels) - count)
+        scatter = _scatter(shifts[seen, i], variances[seen, i], len(labels) - count, level)
         if scatter is not None:
             here = float(fit.hypothesis.cube[i])
             found[int(i)] = Scatter(scatter.deviation, max(here + scatter.low, 0.0), min(here + scatter.high, 1.0))
     return found
 
 
-def _scatter(values: np.ndarray, variances: np.ndarray, spare: int) -> Scatter | None:
+def _scatter(values: np.ndarray, variances: np.ndarray, spare: int, level: float) -> Scatter | None:
     """How values scatter beyond their variances, which `spare` degrees of freedom tell; None where that is chance."""
     if spare < 1 or len(values) < 2:
         return None
     weights = 1.0 / variances
     mean = float(np.sum(weights * values) / weights.sum())
     squares, others = float(np.sum(weights * (values - mean) ** 2)), len(values) - 1
-    if fdtrc(others, spare, squares / others) > MOVES:
+    if fdtrc(others, spare, squares / others) > level:
         return None
     between = (squares - others) / float(weights.sum() - np.sum(weights**2) / weights.sum())
     trusted = mean + (values - mean) * between / (between + variances)

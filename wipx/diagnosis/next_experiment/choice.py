@@ -20,14 +20,12 @@ from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance, inflation
 from wipx.diagnosis.next_experiment.excitations import Reach, excitations_for, how, prescribed
 from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, SimulatedRun, loaded
+from wipx.diagnosis.rules import USUAL, Rules
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import StateFeedback
 
 MOST_RIVALS = 3
 STEPS = 3  # of a rival's fit to a simulated run
-USELESS = 1.0  # standard deviations below which an experiment settles nothing
-DECISIVE = 3.0  # standard deviations that settle a question
-MOST_REPEATS = 20
 
 
 @dataclass(frozen=True)
@@ -54,6 +52,7 @@ def next_experiment(
     feedback: StateFeedback | None,
     rate: float,
     rng: np.random.Generator,
+    rules: Rules = USUAL,
 ) -> NextExperiment | None:
     """The experiment that settles a question best.
 
@@ -66,6 +65,7 @@ def next_experiment(
         feedback: The robot's controller; without one, commands are replayed from where the recordings start.
         rate: Of the controller [Hz].
         rng: Draws phases and noise.
+        rules: What decides.
 
     Returns:
         The menu by the separation of what stays least clear, after one run of 10 s. None where nothing is open, the
@@ -86,12 +86,12 @@ def next_experiment(
     if not trials or not asked.count:
         return None
     table = np.array(separations)
-    settled = table.max(axis=0) >= USELESS
+    settled = table.max(axis=0) >= rules.experiment.useless
     if not settled.any():
         return None
     worst = table[:, settled].min(axis=1)
     experiments = [
-        _experiment(trial, fit, float(separation), closed=closed, rivals=bool(question.rivals))
+        _experiment(trial, fit, float(separation), rules, closed=closed, rivals=bool(question.rivals))
         for trial, separation in zip(trials, worst, strict=True)
     ]
     order = np.argsort(-worst, kind="stable")
@@ -220,10 +220,12 @@ def _steps(cube: np.ndarray, normal: np.ndarray, slope: np.ndarray) -> np.ndarra
     return np.clip(cube - np.array(moves), 0.0, 1.0)
 
 
-def _experiment(trial: SimulatedRun, fit: Fit, separation: float, *, closed: bool, rivals: bool) -> Experiment:
+def _experiment(
+    trial: SimulatedRun, fit: Fit, separation: float, rules: Rules, *, closed: bool, rivals: bool
+) -> Experiment:
     sentence = how(trial.excitation, fit.hypothesis.model, trial.command, closed=closed)
-    repeats = int(np.ceil((DECISIVE / max(separation, 1e-6)) ** 2)) if rivals else 1
-    if 1 < repeats <= MOST_REPEATS:
+    repeats = int(np.ceil((rules.answer.told_apart / max(separation, 1e-6)) ** 2)) if rivals else 1
+    if 1 < repeats <= rules.experiment.most_repeats:
         sentence += f"; do it {repeats} times"
     return Experiment(trial.excitation.name, sentence, separation)
 

@@ -13,19 +13,18 @@ import numpy as np
 from wipx.core.diagnosis import HorizonErrors, LeftForce
 from wipx.core.model import Model
 from wipx.core.plant import Plant
-from wipx.core.results import Trace
+from wipx.core.results import HORIZON, Trace
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import linearise_along
 from wipx.identify.smoothing import Smoother
 from wipx.sim.analytic import AnalyticSimulator
 
-HORIZONS = (0.1, 0.2, 0.5)  # [s] after a start
+HORIZONS = (0.1, 0.2, HORIZON)  # [s] after a start
 WITHIN = 0.05  # [s] up to a horizon, whose rows count
 BANDWIDTH = 30.0  # [rad/s] of the filter; forces that change faster than in 30 ms do not show
 STRETCH = 1.0  # [s] of the stretches that are fitted and judged in turn
 KNOTS = 9  # of a law over a signal, and of a gain over time
 WAVES = np.arange(1, 61)  # that are tried, in multiples of one over the whole way or time
-TELLING = 0.3  # share of the force's variance on the stretches between, from which what it goes with is told
 
 
 def horizon_errors(traces: tuple[Trace, ...]) -> tuple[HorizonErrors, ...]:
@@ -52,7 +51,7 @@ def _since_start(trace: Trace) -> np.ndarray:
 
 
 def left_forces(
-    simulator: AnalyticSimulator, data: RecordingBatch, noise: np.ndarray, model: Model
+    simulator: AnalyticSimulator, data: RecordingBatch, noise: np.ndarray, model: Model, telling: float
 ) -> tuple[LeftForce, ...]:
     """The force that a model lacks on each joint.
 
@@ -61,6 +60,7 @@ def left_forces(
         data: The recordings.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
         model: The completed model.
+        telling: Share of a force's variance that what it goes with must explain.
     """
     plant = data.plant
     smoother = Smoother(simulator, plant, data.recordings, noise)
@@ -72,7 +72,7 @@ def left_forces(
     found = []
     for j, site in enumerate(plant.joints):
         force = np.where(data.counted, forces[:, j], 0.0)
-        kind, signal, period, share = _what(plant, data, states, force, j)
+        kind, signal, period, share = _what(plant, data, states, force, j, telling)
         size = float(np.sqrt(np.mean(force[data.counted] ** 2)))
         unit = "N m" if plant.is_angular(site) else "N"
         found.append(LeftForce(site, size, unit, _lasting(force, data), kind, signal, period, share))
@@ -80,13 +80,13 @@ def left_forces(
 
 
 def _what(
-    plant: Plant, data: RecordingBatch, states: np.ndarray, force: np.ndarray, joint: int
+    plant: Plant, data: RecordingBatch, states: np.ndarray, force: np.ndarray, joint: int, telling: float
 ) -> tuple[str, str | None, float | None, float]:
     """What a force goes with best: kind, signal, period of the signal, and share of its variance; or "random"."""
     best: tuple[str, str | None, float | None, float] = ("random", None, None, 0.0)
     for kind, signal, period, columns in _families(plant, data, states, joint):
         share = _share(columns, force, data)
-        if share > max(best[3], TELLING):
+        if share > max(best[3], telling):
             best = (kind, signal, period, share)
     return best
 

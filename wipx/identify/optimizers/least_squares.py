@@ -24,7 +24,7 @@ BETTER = 0.002  # share by which the loss must fall for the best minimum to be f
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a search has come to.
+    """The current state of a search.
 
     Attributes:
         cube: Position, shape (D,).
@@ -65,7 +65,7 @@ class LeastSquares:
     def minimise(self, problem: Problem, rng: np.random.Generator, watcher: Watcher = unwatched) -> Minimum:
         """The best of the searches; ends early within the budget.
 
-        The first level of smoothing shows which starts lie in a deep valley; the others are not followed further.
+        The first level of smoothing shows which starts lead to a low minimum; the others are not followed further.
         """
         log = Log("least_squares", self.evaluations, self.seconds, watcher)
         wide, narrow = self.smoothing[:1], self.smoothing[1:]
@@ -103,7 +103,7 @@ class LeastSquares:
         return _Place(start, float(log.evaluate(problem, start[None])[0]))
 
     def _settle(self, problem: Problem, best: "_Place", log: Log) -> None:
-        """Follow the best minimum once more as long as that helps: where valleys are many, they are jagged too."""
+        """Repeat the search from the best minimum as long as that helps: a loss with many minima is also jagged."""
         before = np.inf
         while best.loss < (1.0 - BETTER) * before:
             before = best.loss

@@ -1,4 +1,4 @@
-"""What every optimizer shares: its budget, its history, and how it is watched and stopped."""
+"""What all optimizers share: budget, history, progress reports and cancellation."""
 
 import time
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ class Progress:
 
 
 def unwatched(progress: Progress) -> None:
-    """Report progress to nobody."""
+    """Do not report progress."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Minimum:
         cube: Best position in the unit cube, shape (D,).
         loss: Its loss.
         history: How it came about.
-        failed: Evaluations in which every prediction fell over.
+        failed: Evaluations in which every prediction diverged.
     """
 
     cube: np.ndarray
@@ -83,7 +83,7 @@ class Log:
         optimizer: Name of the method.
         evaluations: Budget.
         seconds: Budget [s].
-        watcher: Told of every batch.
+        watcher: Called after every batch.
         share: Part of the search that is done: of the budget, or more where the optimizer knows better.
     """
 
@@ -104,7 +104,8 @@ class Log:
     def evaluate(self, problem: Problem, cube: np.ndarray) -> np.ndarray:
         """Losses (P,) of positions (P, D), computed in one call and noted; never more than the budget allows.
 
-        A position without a finite loss gets one that every other undercuts, with which any method can reckon.
+        A position without a finite loss gets a finite one that is larger than all others, because some methods cannot
+        handle infinity.
 
         Raises:
             BudgetSpentError: the budget of evaluations or seconds is used up.

@@ -1,8 +1,8 @@
-"""`task=concealed`: diagnoses of robots drawn at random, whose physics no model of this package has produced.
+"""`task=blind`: diagnoses of robots drawn at random, whose physics no model of this package has produced.
 
-Three processes that do not see each other's secrets: `concealed_draw` seals what is hidden, `concealed_diagnose` sees
-recordings only, `concealed_judge` opens the seals of answered cases. This module holds the keys, in memory, and hands
-each to the judge once the digests of the case's answers are written down. Tables and page are in `concealed_page`.
+Three processes that do not see each other's secrets: `drawing` seals what is hidden, `diagnosing` sees
+recordings only, `judging` opens the seals of answered cases. This module holds the keys, in memory, and hands
+each to the judge once the digests of the case's answers are written down. Tables and page are in `page`.
 """
 
 import multiprocessing
@@ -59,7 +59,7 @@ class Secrets:
 
 
 @dataclass(frozen=True)
-class Concealed:
+class BlindBenchmark:
     """Draw cases, seal their answers, diagnose each, open the seals and count what was found.
 
     An interrupted run goes on when it is started again in the same folder; a finished one is kept beside a fresh one.
@@ -70,8 +70,8 @@ class Concealed:
         lengths: Shortest and longest time that a recording lasts [s].
         workers: Processes that draw and diagnose.
         tiers: Tiers to draw from; empty for all of exact robots.
-        rivals: Other methods that diagnose the same recordings, options of the group `rival`.
-        rivals_cases: On how many of the cases; a sample of all tiers.
+        baselines: Other methods that diagnose the same recordings, options of the group `baseline`.
+        baselines_cases: On how many of the cases; a sample of all tiers.
         time_limit: For one diagnosis [s].
         page: Markdown page whose table is renewed; None for none.
     """
@@ -81,8 +81,8 @@ class Concealed:
     lengths: tuple[float, float] = LENGTHS
     workers: int = 2
     tiers: tuple[str, ...] = ()
-    rivals: tuple[str, ...] = ()
-    rivals_cases: int = 8
+    baselines: tuple[str, ...] = ()
+    baselines_cases: int = 8
     time_limit: float = 900.0
     page: str | None = None
 
@@ -90,8 +90,8 @@ class Concealed:
         for name, value in (("task.cases", self.cases), ("task.workers", self.workers)):
             if value < 1:
                 raise InputError(f"{name} is {value}, expected 1 or more")
-        if self.rivals_cases < 0:
-            raise InputError(f"task.rivals_cases is {self.rivals_cases}, expected 0 or more")
+        if self.baselines_cases < 0:
+            raise InputError(f"task.baselines_cases is {self.baselines_cases}, expected 0 or more")
         if not SHORTEST <= self.lengths[0] <= self.lengths[1] <= LONGEST:
             raise InputError(
                 f"task.lengths is {list(self.lengths)}, expected the shortest and the longest time of a recording, "
@@ -105,7 +105,7 @@ class Concealed:
         """Diagnose all cases and write the tables and the page."""
         if self.page is not None and not Path(self.page).is_file():
             raise InputError(f"task.page: there is no file {self.page}; correct it")
-        check_methods(self.rivals if self._compared else ())
+        check_methods(self.baselines if self._compared else ())
         folder = RunFolder(job.out)
         with _alone(folder), _ended_like_interrupted():
             held = self._resumed(folder) if folder.commitments.is_file() else self._drawn(folder)
@@ -128,13 +128,13 @@ class Concealed:
             "cases": self.cases,
             "lengths": list(self.lengths),
             "tiers": list(tiers),
-            "rivals": list(self.rivals) if compared else [],
-            "rivals_cases": compared,
+            "baselines": list(self.baselines) if compared else [],
+            "baselines_cases": compared,
         }
 
     @property
     def _compared(self) -> int:
-        return min(self.rivals_cases, self.cases) if self.rivals else 0
+        return min(self.baselines_cases, self.cases) if self.baselines else 0
 
     def _resumed(self, folder: RunFolder) -> Secrets:
         """The secrets of the run in a folder; of a fresh run where that one is finished."""
@@ -196,7 +196,7 @@ class Concealed:
         with _processes(1) as judging, ThreadPoolExecutor(self.workers) as watching:
 
             def finish(case: str, key: str) -> Opened:
-                diagnosers.answer(case, (OURS, *(self.rivals if case in compared else ())))
+                diagnosers.answer(case, (OURS, *(self.baselines if case in compared else ())))
                 return judging.submit(judge, folder.path, case, key).result()
 
             begun = [watching.submit(finish, case, key) for case, key in keys.items()]

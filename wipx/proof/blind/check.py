@@ -1,4 +1,4 @@
-"""`task=concealed_check`: compares a concealed run with its commitments and scores it again, from its files alone."""
+"""`task=blind_check`: compares a blind run with its commitments and scores it again, from its files alone."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,7 @@ from wipx.tasks.shared.job import Job
 
 
 @dataclass(frozen=True)
-class ConcealedCheck:
+class BlindCheck:
     """Check every opened case of a run.
 
     Attributes:

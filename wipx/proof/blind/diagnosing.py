@@ -1,4 +1,4 @@
-"""Second process of a concealed run: a method diagnoses one case, watched, and sees nothing but its recordings."""
+"""Second process of a blind run: a method diagnoses one case, watched, and sees nothing but its recordings."""
 
 import json
 import os
@@ -155,11 +155,11 @@ def check_methods(methods: Iterable[str]) -> None:
     errors = {method: process.communicate()[1] for method, process in begun.items()}
     for method, process in begun.items():
         if process.returncode != 0:
-            raise InputError(f"task.rivals: {method}: {_last_line(errors[method])}")
+            raise InputError(f"task.baselines: {method}: {_last_line(errors[method])}")
 
 
 def _task(method: str) -> list[str]:
-    return ["task=diagnose"] if method == OURS else ["task=rival", f"rival={method}"]
+    return ["task=diagnose"] if method == OURS else ["task=baseline", f"baseline={method}"]
 
 
 def _arguments(recordings: Path, method: str, out: Path) -> list[str]:

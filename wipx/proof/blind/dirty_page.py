@@ -1,4 +1,4 @@
-"""What the page of a concealed run says about dirty robots."""
+"""What the page of a run of the blind benchmark says about dirty robots."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""First process of a concealed run: draws hidden physics, records the robot, and seals what must not be read."""
+"""First process of a blind run: draws hidden physics, records the robot, and seals what must not be read."""
 
 import hashlib
 from pathlib import Path

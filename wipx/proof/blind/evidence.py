@@ -1,4 +1,4 @@
-"""What a concealed run tells about itself: why its figures can be believed, and how far."""
+"""What a run of the blind benchmark tells about itself: why its figures can be believed, and how far."""
 
 import hashlib
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Third process of a concealed run: opens seals of answered cases, checks every digest, and scores."""
+"""Third process of a blind run: opens seals of answered cases, checks every digest, and scores."""
 
 import tempfile
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Results of a concealed run: score.md, score.csv, score.json, confusions.png and the page."""
+"""Results of a run of the blind benchmark: score.md, score.csv, score.json, confusions.png and the page."""
 
 import csv
 import io
@@ -76,12 +76,12 @@ def score_page_of(folder: RunFolder, cases: Sequence[Opened], account: Account) 
     everything, nulls = group_score("all", scores), nothing_hidden(scores)
     alarms = group_score("nothing hidden", nulls).false_alarms if nulls else Count(0, 0)
     return ScorePage(
-        title=f"{robots(len(scores))} with concealed physics",
+        title=f"{robots(len(scores))} with hidden physics",
         headline=_headline(scores, alarms),
         tiles=_tiles(everything, alarms),
         notes=notes(cases, account, alarms),
         proof=proof(folder, cases, account),
-        check=f"python -m wipx task=concealed_check task.folder='{folder.path}'",
+        check=f"python -m wipx task=blind_check task.folder='{folder.path}'",
         methods=_methods(cases),
         groups=(
             *dirty_tables(cases),

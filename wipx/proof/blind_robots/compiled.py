@@ -19,7 +19,7 @@ def _cache_folder() -> Path:
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).resolve().parent.glob("*.py")):
         digest.update(source.read_bytes())
-    name = f"concealed-{digest.hexdigest()[:16]}"
+    name = f"blind-{digest.hexdigest()[:16]}"
     folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wipx" / name
     try:
         folder.mkdir(parents=True, exist_ok=True)

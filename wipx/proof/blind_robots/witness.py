@@ -72,7 +72,7 @@ def hook(settings: Settings, note: Callable[[str, str], None]) -> Callable[[str,
     def watch(event: str, arguments: tuple) -> None:
         if event in OUT_OF_SIGHT:
             note(REFUSED, f"{event} {arguments[0] if arguments else ''}")
-            raise PermissionError(f"{event}: a diagnosis of concealed physics works alone, without other processes")
+            raise PermissionError(f"{event}: a diagnosis of hidden physics works alone, without other processes")
         if event == OPENING or event in MOVING:
             asked = arguments[0]
             if not isinstance(asked, str | bytes | os.PathLike):
@@ -82,7 +82,7 @@ def hook(settings: Settings, note: Callable[[str, str], None]) -> Callable[[str,
             if event == OPENING or not permitted:
                 note(READ if permitted else REFUSED, path)
             if not permitted:
-                raise PermissionError(f"{path}: sealed while physics is concealed")
+                raise PermissionError(f"{path}: sealed while physics is hidden")
 
     return watch
 

@@ -92,9 +92,9 @@ class RealConsistency:
     Attributes:
         sources: Options of the group `recordings`, by name.
         rigs: Settings of the rigs, by name.
-        methods: Options of the group `rival`, by name.
+        methods: Options of the group `baseline`, by name.
         only: Names of the rigs to run; empty for all.
-        rivals: Methods that are given the same groups, names of `methods`.
+        baselines: Methods that are given the same groups, names of `methods`.
         ways: Ways of splitting a rig, at most; None for all.
         groups: Groups of one way that are diagnosed, at most, spread over all; None for all.
         page: Markdown file whose part between the table marks is replaced; None for none.
@@ -104,7 +104,7 @@ class RealConsistency:
     rigs: dict[str, Any] = field(default_factory=dict)
     methods: dict[str, Any] = field(default_factory=dict)
     only: tuple[str, ...] = ()
-    rivals: tuple[str, ...] = ()
+    baselines: tuple[str, ...] = ()
     ways: int | None = None
     groups: int | None = None
     page: str | None = None
@@ -116,7 +116,7 @@ class RealConsistency:
         for name, most in (("ways", self.ways), ("groups", self.groups)):
             if most is not None and most < 1:
                 raise InputError(f"task.{name} is {most}, expected 1 or more, or null for all")
-        check_methods(self.rivals, self.methods)
+        check_methods(self.baselines, self.methods)
 
     def run(self, job: Job) -> None:
         """Diagnose group by group, and write table and figure from all that is done."""
@@ -193,13 +193,13 @@ class RealConsistency:
         if result is None:
             result = _diagnosed(job, group, predicted)
             _keep(job, result, asked)
-        for method in self.rivals:
+        for method in self.baselines:
             if method not in result.answers:
                 fresh = True
                 answer = ask(job, method, self.methods[method], group.source, predicted)
                 result = replace(result, answers={**result.answers, method: answer})
                 _keep(job, result, asked)
-        return replace(result, answers={name: result.answers[name] for name in (OURS, *self.rivals)}), fresh
+        return replace(result, answers={name: result.answers[name] for name in (OURS, *self.baselines)}), fresh
 
 
 def _keep(job: Job, result: GroupResult, asked: Mapping[str, Any]) -> None:

@@ -83,9 +83,9 @@ class RealRecordings:
     Attributes:
         sources: Options of the group `recordings`, by name.
         cases: Settings of the cases, by name.
-        methods: Options of the group `rival`, by name.
+        methods: Options of the group `baseline`, by name.
         only: Names of the cases to run; empty for all.
-        rivals: Methods that are given the same recordings, names of `methods`.
+        baselines: Methods that are given the same recordings, names of `methods`.
         page: Markdown file whose part between the table marks is replaced; None for none.
     """
 
@@ -93,14 +93,14 @@ class RealRecordings:
     cases: dict[str, Any] = field(default_factory=dict)
     methods: dict[str, Any] = field(default_factory=dict)
     only: tuple[str, ...] = ()
-    rivals: tuple[str, ...] = ()
+    baselines: tuple[str, ...] = ()
     page: str | None = None
 
     def __post_init__(self) -> None:
         for name in self.only:
             if name not in self.cases:
                 raise unknown_name("case", name, self.cases, "task.only")
-        check_methods(self.rivals, self.methods)
+        check_methods(self.baselines, self.methods)
 
     def run(self, job: Job) -> None:
         """Diagnose case by case and write the table."""
@@ -108,7 +108,7 @@ class RealRecordings:
         outcomes = []
         for number, (name, one) in enumerate(prepared.items(), start=1):
             print(f"\n[{number}/{len(prepared)}] {name}")
-            outcomes.append(outcome_of(replace(job, out=job.out / name), one, self._rivals))
+            outcomes.append(outcome_of(replace(job, out=job.out / name), one, self._baselines))
         table = markdown(outcomes)
         (job.out / "table.md").write_text(table, encoding="utf-8")
         if self.page is not None:
@@ -116,8 +116,8 @@ class RealRecordings:
         print(f"\n{table}\ntable: {job.out / 'table.md'}")
 
     @property
-    def _rivals(self) -> dict[str, Any]:
-        return {name: self.methods[name] for name in self.rivals}
+    def _baselines(self) -> dict[str, Any]:
+        return {name: self.methods[name] for name in self.baselines}
 
     def _prepared(self, job: Job) -> dict[str, Prepared]:
         """Every dataset, read before the first diagnosis, so that a missing one is reported at once."""
@@ -160,7 +160,7 @@ def check_there(sources: Iterable[RecordingSource]) -> None:
         raise InputError(f"recordings are missing; get them, or set WIPX_RECORDINGS=FOLDER: {'; '.join(missing)}")
 
 
-def outcome_of(job: Job, prepared: Prepared, rivals: Mapping[str, Any]) -> Outcome:
+def outcome_of(job: Job, prepared: Prepared, baselines: Mapping[str, Any]) -> Outcome:
     """Diagnose what is to be fitted, and predict what is held out; other methods, settings by name, do the same.
 
     Leaves heldout.json, heldout.png and, where there is one, authors.yaml beside the diagnosis.
@@ -180,7 +180,7 @@ def outcome_of(job: Job, prepared: Prepared, rivals: Mapping[str, Any]) -> Outco
         _write(job, prepared, diagnosis, errors)
         outcome = replace(outcome, diagnosis=diagnosis, errors=errors)
         ours = answer_of(diagnosis, predicted.errors(diagnosis.model))
-    others = tuple(ask(job, method, settings, seen, predicted) for method, settings in rivals.items())
+    others = tuple(ask(job, method, settings, seen, predicted) for method, settings in baselines.items())
     return replace(outcome, methods=(ours, *others) if others else ())
 
 

@@ -16,7 +16,7 @@ class _Bar:
         self._bar = tqdm(
             total=100,
             desc=label,
-            bar_format="{desc} |{bar:24}| {percentage:3.0f} %, {elapsed} gone, about {remaining} left{postfix}",
+            bar_format="{desc} |{bar:24}| {percentage:3.0f} %, {elapsed} elapsed, about {remaining} left{postfix}",
             file=sys.stderr,
             leave=False,
             disable=None,

@@ -104,13 +104,13 @@ def claim(folder: Path, arguments: Sequence[str]) -> None:
     """Note the command whose results a folder takes.
 
     Raises:
-        InputError: the folder has been begun by another command.
+        InputError: the folder belongs to another command.
     """
     line = shlex.join(["python", "-m", "wipx", *arguments])
     note = folder / COMMAND
     before = note.read_text(encoding="utf-8").strip() if note.is_file() else line
     if before != line:
-        raise InputError(f"{folder}: begun by another command, {before}; set another hydra.run.dir")
+        raise InputError(f"{folder}: made by another command, {before}; set another hydra.run.dir")
     note.write_text(f"{line}\n", encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from tqdm import tqdm
 
-from wipx.control.lqr import Lqr
+from wipx.control.controller import Controller
 from wipx.core.errors import InputError, check_positive
 from wipx.core.load import Load
 from wipx.core.model import Model
@@ -21,6 +21,7 @@ from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.cache import simulator_digest
+from wipx.sim.simulator import StateFeedback
 from wipx.tasks.files.locked import locked
 from wipx.tasks.files.results import write_csv
 from wipx.tasks.shared.job import Job
@@ -75,10 +76,13 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
     missing = [(k, trial) for k, trial in enumerate(trials) if not (folder / trial.name).is_file()]
     if not missing:
         return
-    controller = recording_controller(job)
+    controller: Controller = job.part("controller")
     nominal = job.part("plant").nominal(target.nominal())
+    feedback = controller.state_feedback(nominal)
+    if feedback is None:
+        raise InputError("controller: recordings for a model are made under a plain state feedback; use controller=lqr")
     if not (folder / "robot.yaml").is_file():
-        write_robot(folder / "robot.yaml", nominal, controller, target.loads)
+        write_robot(folder / "robot.yaml", nominal, (feedback, controller.rate), target.loads)
     if isinstance(target, EmulatedTestbed):
         write_model(target.hidden().model, hidden_file(folder))
     loop = controller.loop(nominal)
@@ -87,25 +91,13 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
         write_recording(folder / trial.name, recording)
 
 
-def recording_controller(job: Job) -> Lqr:
-    """The controller with which recordings are made for a model: robot.yaml can describe a state feedback only.
-
-    Raises:
-        InputError: another one was chosen.
-    """
-    controller = job.part("controller")
-    if not isinstance(controller, Lqr):
-        raise InputError("controller: recordings for a model are made under a plain state feedback; use controller=lqr")
-    return controller
-
-
-def write_robot(path: Path, nominal: Model, controller: Lqr, loads: Mapping[str, Load]) -> None:
-    """Describe a robot, its controller and the loads of its recordings as robot.yaml."""
-    gains = controller.feedback(nominal).gains.tolist()
+def write_robot(path: Path, nominal: Model, feedback: tuple[StateFeedback, float], loads: Mapping[str, Load]) -> None:
+    """Describe a robot, its controller with its rate [Hz], and the loads of its recordings as robot.yaml."""
+    gains, rate = feedback[0].gains.tolist(), feedback[1]
     robot: dict[str, Any] = {
         "plant": nominal.plant.kind,
         "parameters": dict(nominal.parameters),
-        "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": controller.rate},
+        "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": rate},
     }
     if nominal.effects:
         robot["effects"] = {name: dict(values) for name, values in nominal.effects.items()}

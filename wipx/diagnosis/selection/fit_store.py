@@ -1,0 +1,165 @@
+"""The fits of one robot, by their sets of effects: each is fitted once, and again where a better start is known.
+
+What is preferred is decided elsewhere (`criteria`, `search`).
+"""
+
+from dataclasses import dataclass, field
+
+from wipx.diagnosis.candidates.screening import Candidate, candidates_beside, candidates_of_effect, unscaled
+from wipx.diagnosis.likelihood import nonsmooth_search
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.selection.criteria import evidence, score
+from wipx.diagnosis.selection.nested_laws import reduced_law, reduced_values
+from wipx.effects.catalogue import kind_of
+
+LOOKED_AT = 8  # starts of each effect that are simulated
+STARTS = 2  # and those from which it is fitted
+CLOSE = 0.5  # of the best gain, from which noise levels are searched too
+FITTED_TO_THE_END = 3  # effects for which they are, at most
+
+
+@dataclass(frozen=True)
+class FitStore:
+    """Fits hypotheses and keeps the best fit of every set of effects.
+
+    Attributes:
+        fitter: Fits hypotheses.
+        setting: The robot.
+    """
+
+    fitter: Fitter
+    setting: Setting
+    _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
+    _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
+    _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, fitter: Fitter, setting: Setting, nominal: Fit) -> "FitStore":
+        """A store that holds the fit of the nominal model."""
+        return cls(fitter, setting, {frozenset(nominal.effects): nominal})
+
+    def keep(self, fit: Fit) -> Fit:
+        """Keep a fit as the best of its effects, and return it."""
+        self._fits[frozenset(fit.effects)] = fit
+        return fit
+
+    def fitted(self, effects: tuple[str, ...], start: Fit) -> Fit:
+        """The fit of some effects; where there is none yet, from the values and noise of another fit on."""
+        key = frozenset(effects)
+        if key not in self._fits:
+            values = {**reduced_values(start), **start.hypothesis.values}
+            hypothesis = Hypothesis.of(self.setting, effects, values)
+            self._fits[key] = self.fitter.converged(self.fitter.fit(hypothesis, start.levels))
+        return self._fits[key]
+
+    def without(self, fit: Fit, effect: str) -> Fit:
+        """The fit of the other effects."""
+        return self.fitted(tuple(e for e in fit.effects if e != effect), fit)
+
+    def reduced(self, fit: Fit, *gone: str) -> Fit:
+        """The fit without some of its effects; the curve that stands in for the rest is kept."""
+        rest = tuple(e for e in fit.effects if e not in gone)
+        setting = self.setting.with_curve_of(fit.hypothesis)
+        if setting is self.setting:
+            return self.fitted(rest, fit)
+        hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
+        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+
+    def with_reduced_law(self, fit: Fit, effect: str) -> Fit | None:
+        """The fit with the simple law that an effect contains in its place; None where there is none or no room."""
+        rest = tuple(e for e in fit.effects if e != effect)
+        simple = reduced_law(effect, rest, fit.hypothesis.model.plant)
+        return None if simple is None else self.fitted((*rest, simple), fit)
+
+    def candidates_for(self, fit: Fit) -> list[Candidate]:
+        """Where to start for every effect that could be added, the best first."""
+        if id(fit) not in self._candidates:
+            self._candidates[id(fit)] = (fit, candidates_beside(self.fitter, self.setting, fit))
+        return self._candidates[id(fit)][1]
+
+    def extensions(self, fit: Fit) -> list[Fit]:
+        """Fits with one effect more, the best first."""
+        key = frozenset(fit.effects)
+        if key not in self._extensions:
+            self._extensions[key] = self._extended(fit)
+        return self._extensions[key]
+
+    def replacements(self, fit: Fit, effect: str) -> list[Fit]:
+        """Fits with another effect in the place of one, the best first."""
+        return self.extensions(self.without(fit, effect))
+
+    def refitted_from(self, fit: Fit, larger: Fit) -> Fit:
+        """A fit, or a better one of the same effects that starts from the noise of a larger fit.
+
+        A search over noise levels that stopped early would credit the next effect with finishing it.
+        """
+        again = self.fitter.fit(fit.hypothesis, larger.levels)
+        if again.log_likelihood < fit.log_likelihood + 1.0:
+            return fit
+        return self.keep(self.fitter.converged(again))
+
+    def searched_by_trial(self, fit: Fit) -> Fit:
+        """A fit, or a better one of the same effects that a search by trial leads to."""
+        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
+        return fit if moved is fit else self.keep(self.fitter.converged(moved))
+
+    def restarted(self, fit: Fit) -> Fit:
+        """A fit, or a better one of the same effects that another search leads to.
+
+        Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother. Where the
+        likelihood of an effect has many peaks, the highest may be another one beside further effects.
+        """
+        found = [self.fitter.converged(self.fitter.fit(fit.hypothesis, self.fitter.escape_levels(fit)))]
+        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
+        if moved is not fit:
+            found.append(self.fitter.converged(moved))
+        if len(fit.effects) > 1:
+            found += [self._restarted_without(fit, effect) for effect in fit.effects if kind_of(effect).scan]
+        again = max(found, key=lambda each: each.log_likelihood)
+        return fit if again.log_likelihood < fit.log_likelihood + 1.0 else self.keep(again)
+
+    def _restarted_without(self, fit: Fit, effect: str) -> Fit:
+        """A fit of the same effects, for which one of them starts from where the others leave it room."""
+        base = self.without(fit, effect)
+        starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
+        return self.fitter.converged(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
+
+    def _extended(self, fit: Fit) -> list[Fit]:
+        ranked = self.candidates_for(fit)
+        by_effect: dict[str, list[Candidate]] = {}
+        for candidate in ranked:
+            by_effect.setdefault(candidate.effect, []).append(candidate)
+        best = max((ranked[0].gain if ranked else 0.0), 0.0)
+        rules = self.fitter.own_rules
+        least = max(rules.promising * best, rules.worthless)
+        leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
+        leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
+        fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
+        fits.sort(key=lambda f: -score(f, fit))
+        gains = [evidence(fit, f) for f in fits]
+        polished = []
+        for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
+            close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
+            polished.append(self.fitter.converged(found) if close else found)
+            if close:
+                self._fits.setdefault(frozenset(found.effects), polished[-1])
+        return sorted(polished, key=lambda f: -score(f, fit))
+
+    def _best_start(self, fit: Fit, starts: list[Candidate]) -> Fit:
+        effects = (*fit.effects, starts[0].effect)
+        own = [start.values for start in starts] + unscaled(self.setting, starts[0].effect)
+        values = [{**others, **start} for others in nonsmooth_search.beside(fit, starts[0].effect) for start in own]
+        begins = [Hypothesis.of(self.setting, effects, each) for each in values]
+        levels = self.fitter.spread_for(begins[0].model, fit.levels)
+        count = STARTS
+        if starts[0].effect == nonsmooth_search.DELAY:
+            begins += [
+                guess for begin in begins[:: len(own)] for guess in nonsmooth_search.delays(self.fitter, begin, levels)
+            ]
+            count = nonsmooth_search.PEAKS
+        likeliest = self.fitter.likeliest(begins, levels, count)
+        fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
+        if kind_of(starts[0].effect).non_smooth:
+            fits = [nonsmooth_search.searched_by_trial(self.fitter, found) for found in fits]
+        return max(fits, key=lambda f: f.log_likelihood)
