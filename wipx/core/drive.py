@@ -4,6 +4,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 Logged = Literal["command", "motor", "link"]
+BEFORE_THE_MOTOR = (
+    "delay",
+    "dead_zone",
+    "saturation",
+    "speed_limit",
+    "lag",
+)  # effects that its recorded torque has in it
 
 
 @dataclass(frozen=True)
@@ -28,3 +35,9 @@ class Drive:
     limit: float | None = None
     rate: float | None = None
     logged: Logged = "command"
+
+    def shows(self, kind: str, *, at_joint: bool) -> bool:
+        """Whether recordings can show an effect of the drive, or of its joint, beside the recorded command."""
+        if at_joint:
+            return self.logged != "link" or kind in ("rotor_inertia", "spring")
+        return self.logged == "command" or kind not in BEFORE_THE_MOTOR

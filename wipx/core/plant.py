@@ -89,6 +89,13 @@ class Plant:
         links = tuple(f"link_{link.body}" for link in self.tree.links)
         return (*self.joints, "actuator", *drives, *sensors, *links, "environment")
 
+    def shows(self, site: str, kind: str) -> bool:
+        """Whether recordings can show an effect of that kind at a site, with the commands that they have."""
+        drive = self.drives.get(self.joint_at(site)) if self.drives else None
+        if drive is None or drive.kind == "none" or not (site in self.columns or site.startswith("actuator")):
+            return True
+        return drive.shows(kind, at_joint=site in self.columns)
+
     def class_of(self, site: str) -> str:
         """How effects name a site among those at which they can act (`wipx.core.effect.Effect.sites`).
 

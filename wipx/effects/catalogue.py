@@ -77,7 +77,7 @@ def vocabulary(plant: Plant) -> dict[str, Effect]:
         for effect in every
         for at in effect.sites
         for site in sites.get(at, ())
-        if have.issuperset(effect.needs)
+        if have.issuperset(effect.needs) and plant.shows(site, effect.kind)
     }
 
 

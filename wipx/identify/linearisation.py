@@ -35,10 +35,11 @@ def linearise_along(model: Model, coordinates: np.ndarray) -> Linearisation:
     joints = coordinates.shape[1]
     rounded = np.zeros((len(coordinates), coordinates.shape[2], joints), dtype=np.int64)
     for j, name in enumerate(model.plant.coordinates):
-        if name != "x":
+        if model.plant.joints[j] not in model.plant.sliding:
             rounded[..., j] = np.rint(coordinates[:, j] / GRID)
     places, index = np.unique(rounded.reshape(-1, joints), axis=0, return_inverse=True)
-    bare = Model(model.plant, model.parameters, {})
+    friction = {name: 0.0 for name in model.parameters if name.endswith(".friction")}  # that a model file gives
+    bare = Model(model.plant, {**model.parameters, **friction}, {})
     probes = {f"{site}/viscous": {"sigma": 0.0} for site in model.plant.joints}
     probed = bare.with_effects(probes)
     states = np.zeros((2 * joints, len(places), 1 + 4 * joints))

@@ -52,32 +52,38 @@ def _first_line(error: Exception) -> str:
 
 def _strip(mujoco: Any, spec: Any, path: Path) -> None:
     """Leave only what moves: joints and inertias."""
+    _refuse_joints(mujoco, spec, path)
+    lists = (spec.actuators, spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras)
+    _delete(spec, *lists)
+    for body in spec.bodies[1:]:
+        mesh = mujoco.mjtGeom.mjGEOM_MESH
+        _delete(spec, [geom for geom in body.geoms if body.explicitinertial or geom.type == mesh])
+    _delete(spec, spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures)
+
+
+def _delete(spec: Any, *lists: Any) -> None:
+    for each in (item for many in lists for item in list(many)):
+        spec.delete(each)
+
+
+def _refuse_joints(mujoco: Any, spec: Any, path: Path) -> None:
+    """Refuse what is no hinge or slide, and what closes a loop."""
+    named = {mujoco.mjtJoint.mjJNT_FREE: "free", mujoco.mjtJoint.mjJNT_BALL: "ball"}
     for joint in spec.joints:
-        if joint.type in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
-            kind = "free" if joint.type == mujoco.mjtJoint.mjJNT_FREE else "ball"
+        if joint.type in named:
             raise InputError(
-                f"{path}: joint {joint.name or 'without a name'} is a {kind} joint, expected hinges and slides on a "
-                f"fixed base; a base that moves in the plane is a slide and a hinge"
+                f"{path}: joint {joint.name or 'without a name'} is a {named[joint.type]} joint, expected hinges and "
+                f"slides on a fixed base; a base that moves in the plane is a slide and a hinge"
             )
     if spec.equalities:
         first = spec.equalities[0]
         names = " and ".join(name for name in (first.name1, first.name2) if name)
         raise InputError(
             f"{path}: {names or first.name or 'two bodies'} are coupled (a closed loop, a coupling of joints or a "
-            f"mimic joint), expected an open tree; remove the coupling or lock one of the joints in robot.yaml"
+            f"mimic joint), expected an open tree; remove the coupling from the file"
         )
     if spec.tendons:
         raise InputError(f"{path}: tendon {spec.tendons[0].name or 1} is not supported; remove it from the file")
-    for many in (spec.actuators, spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras):
-        for each in list(many):
-            spec.delete(each)
-    for body in spec.bodies[1:]:
-        for geom in list(body.geoms):
-            if body.explicitinertial or geom.type == mujoco.mjtGeom.mjGEOM_MESH:
-                spec.delete(geom)
-    for many in (spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures):
-        for each in list(many):
-            spec.delete(each)
 
 
 def _refuse(mujoco: Any, model: Any, path: Path) -> None:

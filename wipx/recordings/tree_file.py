@@ -13,8 +13,11 @@ from wipx.core.tree import Link, Tree
 from wipx.recordings.robot_model import read_tree
 from wipx.recordings.strict_yaml import finite_number
 
-KINDS = ("torque", "position", "none")
-DRIVE_KEYS = {"torque": ("kind", "gain", "logged"), "position": ("kind", "kp", "kd", "limit", "rate", "logged")}
+DRIVE_KEYS = {
+    "torque": ("kind", "gain", "logged"),
+    "position": ("kind", "kp", "kd", "limit", "rate", "logged"),
+    "none": ("kind",),
+}
 ARRAYS = ("rotation", "place", "com", "inertia", "body_rotation", "body_place")
 
 
@@ -54,7 +57,10 @@ def plant_to_mapping(plant: Plant) -> dict[str, object]:
         plain |= {name: getattr(link, name).tolist() for name in ARRAYS}
         plain["limits"] = None if link.limits is None else list(link.limits)
         links.append(plain)
-    drives = {joint: {k: v for k, v in vars(drive).items() if v is not None} for joint, drive in plant.drives.items()}
+    drives = {
+        joint: {key: getattr(drive, key) for key in DRIVE_KEYS[drive.kind] if getattr(drive, key) is not None}
+        for joint, drive in plant.drives.items()
+    }
     return {"tree": {"gravity": plant.tree.gravity.tolist(), "links": links}, "drives": drives}
 
 
@@ -83,11 +89,11 @@ def _drive(data: object, where: str) -> Drive:
     if not isinstance(data, Mapping):
         raise InputError(f"{where} is {data!r}, expected settings such as {{kind: torque, gain: 1.0}}")
     kind = str(data.get("kind", "torque"))
-    if kind not in KINDS:
-        raise unknown_name("kind of drive", kind, KINDS, where)
-    valid = DRIVE_KEYS.get(kind, ("kind",)) if kind != "none" else ("kind",)
+    if kind not in DRIVE_KEYS:
+        raise unknown_name("kind of drive", kind, DRIVE_KEYS, where)
+    valid = DRIVE_KEYS[kind]
     for key in data:
-        if key not in (*valid, *(("limit", "rate", "kp", "kd", "gain", "logged") if "tree" in where else ())):
+        if key not in valid:
             raise unknown_name("setting", str(key), valid, where)
     logged = str(data.get("logged", "command"))
     if logged not in get_args(Logged):

@@ -1,8 +1,8 @@
 """The path from the command to the force on a joint, in causal order; compiled.
 
-Delay, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash. A drive that reports
-its force knows it up to the lag; ripple and backlash are mechanical. Every part is a loop over the lanes of a
-block and is skipped where it is absent (see `wipx.sim.kernel`).
+Delay, the loop of a position drive, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash.
+A drive that reports its force knows it up to the lag; ripple and backlash are mechanical. Every part is a loop over the
+lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
 """
 
 from wipx.core.law import clip, inlined, law, sign, sin_cos
@@ -10,6 +10,8 @@ from wipx.effects import backlash as backlash_law
 from wipx.effects import dead_zone, saturation, speed_limit
 from wipx.sim import rows as R
 from wipx.sim.rows import W
+
+EARLY = 1e-9  # [s] before its time that the loop of a drive looks; steps end there but for rounding
 
 
 @law
@@ -50,9 +52,29 @@ def ramped(t_rows, ramps, window, i, j, begin, end):
     return (end - begin) * ramps[i, j, window] * clip(place, -0.5, 0.5)
 
 
+@law
+def servo(S, J, n):
+    """The force of a position drive for the target that has arrived; between the turns of its loop it is held."""
+    for w in range(n):
+        period, now = J[R.SERVO_PERIOD * W + w], S[R.TIME * W + w]
+        sampled = period > 0.0
+        q = J[R.Q * W + w] if sampled else J[R.MID * W + w]
+        v = J[R.V * W + w] if sampled else J[R.RATE * W + w]
+        limit = J[R.SERVO_LIMIT * W + w]
+        force = clip(J[R.SERVO_KP * W + w] * (J[R.DRIVE * W + w] - q) - J[R.SERVO_KD * W + w] * v, -limit, limit)
+        due = not sampled or now >= J[R.SERVO_NEXT * W + w] - EARLY or J[R.STARTED * W + w] == 0.0
+        if due and J[R.H * W + w] > 0.0:
+            following = J[R.SERVO_NEXT * W + w] + period
+            J[R.SERVO_NEXT * W + w] = following if following > now else now + period
+            J[R.SERVO_FORCE * W + w] = force
+        J[R.DRIVE * W + w] = force if due else J[R.SERVO_FORCE * W + w]
+
+
 @inlined
-def actuator_path(J, n, on, has, j):
+def actuator_path(S, J, n, on, has, j):
     """From the command of a joint to the force on it."""
+    if has[j, R.ON_SERVO]:
+        servo(S, J, n)
     if has[j, R.ON_OFFSET]:
         for w in range(n):
             J[R.DRIVE * W + w] += J[R.OFFSET * W + w]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from wipx.core.drive import Drive
 from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
@@ -25,6 +26,7 @@ from wipx.sim.tree import equations as E
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
 Columns = Mapping[str, np.ndarray]
+NO_LIMIT = 1e12  # [N m or N] of a drive without one
 ON = "ON_"  # names of flags begin so
 
 
@@ -126,12 +128,14 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
         j = joint_index(plant, site)
         f.has[j, R.ACTUATED] = True
         f.joints[j, R.INPUT_GAIN] = _input_gain(f, site)
+        if site in plant.drives and plant.drives[site].kind == "position":
+            _servo(f, site, plant.drives[site])
     for site, speed in zip(plant.joints, smoothing, strict=False):
         f.joints[joint_index(plant, site), R.SMOOTHING] = speed
         f.on[R.ON_SMOOTHING] = True
     f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
     f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
-    f.on[R.ON_TIME] = f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
+    f.on[R.ON_TIME] |= f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
     return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 
@@ -250,6 +254,17 @@ def _tree(f: _Filler, tree: Tree) -> Any:
         f.on[R.ON_DAMPING] |= bool(damping.any())
         f.on[R.ON_FRICTION] |= bool(friction.any())
     return code.rigid_body(tree)
+
+
+def _servo(f: _Filler, site: str, drive: Drive) -> None:
+    """The loop of a position drive."""
+    j = joint_index(f.plant, site)
+    f.has[j, R.ON_SERVO] = True
+    f.joints[j, R.SERVO_KP] = f.batch.column(f"{site}.kp")
+    f.joints[j, R.SERVO_KD] = f.batch.column(f"{site}.kd")
+    f.joints[j, R.SERVO_LIMIT] = NO_LIMIT if drive.limit is None else drive.limit
+    f.joints[j, R.SERVO_PERIOD] = 0.0 if drive.rate is None else 1.0 / drive.rate
+    f.on[R.ON_TIME] |= drive.rate is not None
 
 
 def _input_gain(f: _Filler, site: str) -> np.ndarray:

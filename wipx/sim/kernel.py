@@ -61,7 +61,7 @@ def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
             for w in range(n):
                 J[R.DRIVE * W + w] += J[R.RAMP * W + w] * S[R.PHASE * W + w]
         if has[j, R.ACTUATED]:
-            actuator_path(J, n, on, has, j)
+            actuator_path(S, J, n, on, has, j)
         loaded(J, n, on, has, j)
     if on[R.ON_RAMP]:
         for w in range(n):

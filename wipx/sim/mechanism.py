@@ -78,6 +78,8 @@ def check_possible(model: Model, engine: str) -> None:
     Raises:
         InputError: a mass is negative, or an inertia smaller than that of a point mass.
     """
+    if model.plant.tree is not None:
+        raise InputError(f"sim={engine} cannot step a robot from a model file yet; use sim=analytic")
     for name in ("geometry/payload", "geometry/payload_event"):
         mass = value(model, name, "mass", 0.0)
         if mass < 0.0:

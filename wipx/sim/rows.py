@@ -29,6 +29,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     MADE, LIGHTNESS,  # accelerations in the last step: by the drive, and by a force of one
     SWING_PLACE, SWING_RATE,
     EXTRA,  # acceleration that an observer adds
+    SERVO_FORCE, SERVO_NEXT,  # what the loop of a position drive asks for, and when it looks again
     SIDE,  # to which dry friction acts: -1, 1, or 0 where it holds the joint
     STARTED,  # 0 before the first step, then 1
     STATES,
@@ -38,6 +39,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
 # Coefficients of a model, constant during a rollout.
 (
     ROTOR, SPRING, SPRING_REST,
+    SERVO_KP, SERVO_KD, SERVO_LIMIT, SERVO_PERIOD,
     INPUT_GAIN, DELAY, OFFSET, DEAD_BAND, GAIN, FORCE_MAX, STALL, FREE_SPEED, BACK_EMF, LAG_RATE,
     RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING, RETURNED, CONTACT_RATE,
     VISCOUS, DRAG, LEVEL_PLUS, LEVEL_MINUS, STATIC, COULOMB, STRIBECK_SPEED, SPOT, SPOT_LOW, SPOT_HIGH,
@@ -88,14 +90,14 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
 (
     ACTUATED,
     ON_LAWS, ON_MEMORY,  # any law of friction beyond a level and damping; any part that must know whether it began
-    ON_SPRING, ON_OFFSET, ON_DEAD_ZONE, ON_GAIN, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG, ON_RIPPLE,
-    ON_BACKLASH,
+    ON_SERVO, ON_SPRING, ON_OFFSET, ON_DEAD_ZONE, ON_GAIN, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG,
+    ON_RIPPLE, ON_BACKLASH,
     ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_HYSTERESIS, ON_PAPER, ON_REMAINDER, ON_SWING,
     JOINT_FLAGS,
     *_,
 ) = range(FLAGS, 100)  # fmt: skip
 LAWS = (ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_PAPER, ON_REMAINDER, ON_SWING)
-MEMORY = (ON_LAG, ON_BACKLASH, ON_PAPER)
+MEMORY = (ON_LAG, ON_BACKLASH, ON_PAPER, ON_SERVO)
 
 # What the code of a rigid body is asked for.
 (

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.plant import PLANTS, RATE_OF
+from wipx.core.plant import PLANTS
 from wipx.proof.blind_robots.logging import PLACES, Run
 
 
@@ -53,9 +53,9 @@ def blemished(run: Run, kind: str, blemishes: Blemishes, rng: np.random.Generato
     """The run as a log with faults has it; time and commands are right."""
     columns = dict(run.columns)
     t, names = columns["t"], PLANTS[kind].coordinates
-    readings = [name for name in (*names, *(RATE_OF[name] for name in names)) if name in columns]
+    readings = [name for name in (*names, *(f"{name}_dot" for name in names)) if name in columns]
     for name in names:
-        rate = RATE_OF[name]
+        rate = f"{name}_dot"
         if rate in columns and blemishes.smoothing > 0.0:
             smooth = _low_pass(columns[rate], t, blemishes.smoothing)
             columns[rate] = np.round(np.interp(t - blemishes.late, t, smooth), PLACES)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.core.plant import PLANTS, RATE_OF
+from wipx.core.plant import PLANTS
 from wipx.proof.blind_robots.engine import simulate
 from wipx.proof.blind_robots.physics import DRIVEN, MOVING
 from wipx.proof.blind_robots.robots import Robot
@@ -102,7 +102,7 @@ def logged(robot: Robot, course: Course, scenario: Scenario, settings: LogSettin
         moving[name] = rates[rows, joint]
     for joint, name in zip(MOVING[robot.kind], plant.coordinates, strict=True):
         if joint in settings.rates:
-            columns[RATE_OF[name]] = rates[rows, joint] + scenario.rate_noise[rows, joint]
+            columns[f"{name}_dot"] = rates[rows, joint] + scenario.rate_noise[rows, joint]
     columns = {name: np.round(values, PLACES) + 0.0 for name, values in columns.items()}
     for joint, name in zip(DRIVEN[robot.kind], plant.commands, strict=True):
         columns[name] = _rounded(_means(commands[:, joint], scenario))

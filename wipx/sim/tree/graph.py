@@ -85,28 +85,25 @@ class Graph:
 
     def multiply(self, a: Scalar, b: Scalar) -> Scalar:
         """Product of two numbers."""
-        if not isinstance(a, Node) and not isinstance(b, Node):
-            return a * b
         if not isinstance(a, Node):
-            a, b = b, a
+            return self._scaled(b, a) if isinstance(b, Node) else a * b
         if not isinstance(b, Node):
-            assert isinstance(a, Node)
-            if b == 0.0:
-                return 0.0
-            if b == 1.0:
-                return a
-            if b == -1.0:
-                return self._negative(a)
-            if a.index in self._negated:
-                return self.multiply(self._negated[a.index], -b)
-            return self.named(f"{self.name(a)} * {b!r}")
-        assert isinstance(a, Node)
-        if a.index in self._negated and b.index in self._negated:
-            return self.multiply(self._negated[a.index], self._negated[b.index])
-        for one, other in ((a, b), (b, a)):
-            if one.index in self._negated:
-                return self.multiply(self.multiply(self._negated[one.index], other), -1.0)
-        return self.named(" * ".join(sorted((self.name(a), self.name(b)))))
+            return self._scaled(a, b)
+        signs = [number.index in self._negated for number in (a, b)]
+        a, b = self._negated.get(a.index, a), self._negated.get(b.index, b)
+        both = self.named(" * ".join(sorted((self.name(a), self.name(b)))))
+        return self._negative(both) if signs[0] != signs[1] else both
+
+    def _scaled(self, a: Node, factor: float) -> Scalar:
+        if factor == 0.0:
+            return 0.0
+        if factor == 1.0:
+            return a
+        if factor == -1.0:
+            return self._negative(a)
+        if a.index in self._negated:
+            return self._scaled(self._negated[a.index], -factor)
+        return self.named(f"{self.name(a)} * {factor!r}")
 
     def _negative(self, a: Node) -> Node:
         if a.index in self._negated:
