@@ -5,20 +5,18 @@ acts (payload, inertia, reflected rotor inertia): everything that is constant du
 is in `wipx.sim.kernel`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from wipx.core.effect import Effect
+from wipx.core.effect import Columns, Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.effects.catalogue import kind_of, kinds
 from wipx.effects.payload import loaded
 from wipx.sim import rows as R
-
-Columns = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
