@@ -5,7 +5,7 @@ acts (payload, inertia, reflected rotor inertia): everything that is constant du
 is in `wipx.sim.kernel`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wipx.core.drive import Drive
-from wipx.core.effect import Effect
+from wipx.core.effect import Columns, Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.tree import Tree
@@ -25,7 +25,6 @@ from wipx.sim.tree import code
 from wipx.sim.tree import equations as E
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
-Columns = Mapping[str, np.ndarray]
 NO_LIMIT = 1e12  # [N m or N] of a drive without one
 ON = "ON_"  # names of flags begin so
 
