@@ -34,8 +34,8 @@ def linearise_along(model: Model, coordinates: np.ndarray) -> Linearisation:
     """The body of a model, its friction aside, at rest at the angles of `coordinates`, shape (K + 1, joints, R)."""
     joints = coordinates.shape[1]
     rounded = np.zeros((len(coordinates), coordinates.shape[2], joints), dtype=np.int64)
-    for j, name in enumerate(model.plant.coordinates):
-        if model.plant.joints[j] not in model.plant.sliding:
+    for j, site in enumerate(model.plant.joints):
+        if site not in model.plant.sliding:
             rounded[..., j] = np.rint(coordinates[:, j] / GRID)
     places, index = np.unique(rounded.reshape(-1, joints), axis=0, return_inverse=True)
     friction = {name: 0.0 for name in model.parameters if name.endswith(".friction")}  # that a model file gives
