@@ -10,7 +10,7 @@ from markdown_table import table
 
 from wipx.core.effect import Effect
 from wipx.core.parameters import UNITS, Parameter
-from wipx.effects.catalogue import kinds
+from wipx.effects.catalogue import kinds, of_trees
 
 FOLDER = "reference/effects"
 SHOWN = {"kind", "parameters", "law", "source", "sites", "steady"}  # what the page shows in a place of its own
@@ -74,10 +74,14 @@ def _index() -> str:
         (f"[{kind}]({kind}.md)", f"`{effect.law}`", ", ".join(effect.sites), _answer(not effect.outside_vocabulary))
         for kind, effect in kinds().items()
     ]
+    trees = [(f"`{kind}`", f"`{effect.law}`", ", ".join(effect.sites)) for kind, effect in of_trees().items()]
     return (
         "# Effects\n\nWhat a model can have beside its rigid body. `effects=[site/kind, ...]` switches it on. "
         "A diagnosis looks for the effects of the *vocabulary* first, and for the others if these leave something over."
-        f"\n\n{table(('effect', 'law', 'sites', 'vocabulary'), rows)}\n"
+        f"\n\n{table(('effect', 'law', 'sites', 'vocabulary'), rows)}\n\n"
+        "The sites `joint`, `drive`, `drives`, `sensor`, `link` and `base` are those of a "
+        "[robot from a model file](../../howto/robot.md). Some effects act otherwise there:\n\n"
+        f"{table(('effect', 'law', 'sites'), trees)}\n"
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sim.robots import LIVELY, PARAMETERS, energy, move, robot
 
-from wipx.core.effect import Effect
+from wipx.core.effect import JOINT_SITES, Effect
 from wipx.core.plant import PLANTS
 from wipx.effects.catalogue import kinds, vocabulary
 from wipx.sim.analytic import AnalyticSimulator
@@ -75,7 +75,7 @@ def test_friction_alone_never_raises_the_speed_of_a_carriage(friction: str):
 
 
 def test_every_effect_with_a_law_of_friction_acts_at_every_joint():
-    everywhere = {"translation", "pitch", "joint1", "joint2"}
+    everywhere = set(JOINT_SITES)
     one_place = {"sticky_spot"}  # a place on the rail
     joint_effects: list[Effect] = [kinds()[kind] for kind in FRICTION if kind not in one_place]
     assert all(set(effect.sites) == everywhere for effect in joint_effects)
