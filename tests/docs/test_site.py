@@ -49,11 +49,13 @@ def test_every_effect_has_a_page_with_its_law_parameters_and_source(kind: str):
 
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_robot_files_on_a_page_can_be_read(page: Path):
+def test_robot_files_on_a_page_can_be_read(page: Path, tmp_path: Path):
+    for block in re.findall(r"^```xml\n(.*?)^```$", page.read_text(), flags=re.DOTALL | re.MULTILINE):
+        (tmp_path / "arm.xml").write_text(block)
     for block in re.findall(r"^```yaml\n(.*?)^```$", page.read_text(), flags=re.DOTALL | re.MULTILINE):
         content = yaml.safe_load(block)
         if "plant" in content:
-            robot_from_mapping(content, page.name)
+            robot_from_mapping(content, page.name, tmp_path)
 
 
 def test_equations_become_mathml():

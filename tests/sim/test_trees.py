@@ -1,8 +1,8 @@
 """Robots from model files: equations against MuJoCo's, exact sticking, and their own plants where there is one."""
 
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from sim.random_trees import mjcf
@@ -14,8 +14,10 @@ from wipx.recordings.robot_model import read_tree
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 from wipx.sim.tree import equations as E
+from wipx.sim.tree.graph import Node
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
+mujoco: Any = pytest.importorskip("mujoco")
 TWO = """<mujoco><worldbody><body name="upper"><inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.01 0.01 0.001"/>
 <joint name="shoulder" axis="0 -1 0" damping="0.01"/><body name="lower" pos="0 0 -0.3">
 <inertial pos="0 0 -0.15" mass="0.3" diaginertia="0.004 0.004 0.0005"/>
@@ -57,6 +59,7 @@ def equations(model: Model, q: np.ndarray, rates: np.ndarray) -> tuple[np.ndarra
     entries = E.mass_matrix(tree, poses, inertias, [link.armature for link in tree.links])
     matrix = np.zeros((len(q), len(q)))
     for (i, j), entry in entries.items():
+        assert not isinstance(entry, Node)
         matrix[i, j] = matrix[j, i] = entry
     down = gravity(batch, tree)[:, 0]
     return matrix, np.array(E.bias(tree, poses, rates.tolist(), inertias, (down[0], down[1], down[2])))
