@@ -152,8 +152,9 @@ class Effect:
         source: Paper or book.
         needs: Joints or plant parameters without which the effect has no meaning.
         rows: Coefficients that it gives the simulator, by name of their row in `wipx.sim.rows`: a symbol, or a
-            function of the effect's numbers and the rigid body's, each (P,), for P models. The name of a pair stands
-            for the row of the effect's joint, `X` for `SENSOR_X` at a sensor; a value of shape (n, P) fills n rows.
+            function of the effect's numbers and the rigid body's, each (P,), for P models. It stands for the row of
+            the effect's joint, or of each driven joint; `X` for `SENSOR_X` at a sensor. A value of shape (n, P) fills n
+            rows.
             Effects that fill one row add up. Empty where an effect only changes masses.
         parts: Parts of the simulator's signal path that it switches on, named likewise without `ON_`; a function of
             its numbers where they decide.
