@@ -2,15 +2,16 @@
 
 A rigid body is a function of the rows of a block: it writes the mass matrix and adds its forces to those on the
 joints. The five plants of contract section 2 have two joints here: translation and joint1 are the first, pitch and
-joint2 the second; one that a plant lacks stays at rest.
+joint2 the second; one that a plant lacks stays at rest. Here all rows are those of one array, so that the compiler sees
+that they do not overlap: the block of the first joint, that of the second, the rows of the whole robot.
 """
 
 from wipx.core.law import clip, law, maximum, sin_cos
 from wipx.sim import rows as R
-from wipx.sim.cache import part
 from wipx.sim.rows import W
 
 JOINTS = 2
+FIRST, SECOND, WHOLE = 0, R.BLOCK, 2 * R.BLOCK
 M11, M12, M22 = range(R.COMMON, R.COMMON + 3)
 
 # Numbers of the rigid body.
@@ -25,78 +26,81 @@ M11, M12, M22 = range(R.COMMON, R.COMMON + 3)
 
 
 @law
-def share_after(S, w):
-    """Share of the step of lane w that is after the payload event."""
-    h = maximum(S[R.STEP * W + w], 1e-12)
-    return clip((S[R.TIME * W + w] + h - S[EVENT_TIME * W + w]) / h, 0.0, 1.0)
+def share_after(h, now, event):
+    """Share of a step of length h from a time on that is after a payload event [s]."""
+    h = maximum(h, 1e-12)
+    return clip((now + h - event) / h, 0.0, 1.0)
 
 
 @law
-def payload_event(S, B, n):
+def _after(A, w):
+    """That of lane w."""
+    at = WHOLE * W + w
+    return share_after(A[R.STEP * W + at], A[R.TIME * W + at], A[EVENT_TIME * W + at])
+
+
+@law
+def payload_event(A, n):
     """Masses after t0 in place of those before, weighed by the share of the step after t0."""
-    P, D = B[0], B[1]
     for w in range(n):
-        after = share_after(S, w)
-        s, c = sin_cos(D[R.MID * W + w] - S[BALANCE * W + w])
-        rate = D[R.RATE * W + w]
-        coupling = after * S[EVENT_COUPLING * W + w]
-        S[M11 * W + w] += after * S[EVENT_MASS * W + w]
-        S[M22 * W + w] += after * S[EVENT_INERTIA * W + w]
-        S[M12 * W + w] -= coupling * c
-        P[R.FORCE * W + w] -= coupling * s * rate * rate + after * S[EVENT_WEIGHT * W + w]
-        D[R.FORCE * W + w] += after * S[EVENT_GRAVITY * W + w] * s
+        after = _after(A, w)
+        s, c = sin_cos(A[(SECOND + R.MID) * W + w] - A[(WHOLE + BALANCE) * W + w])
+        rate = A[(SECOND + R.RATE) * W + w]
+        coupling = after * A[(WHOLE + EVENT_COUPLING) * W + w]
+        A[(WHOLE + M11) * W + w] += after * A[(WHOLE + EVENT_MASS) * W + w]
+        A[(WHOLE + M22) * W + w] += after * A[(WHOLE + EVENT_INERTIA) * W + w]
+        A[(WHOLE + M12) * W + w] -= coupling * c
+        A[(FIRST + R.FORCE) * W + w] -= coupling * s * rate * rate + after * A[(WHOLE + EVENT_WEIGHT) * W + w]
+        A[(SECOND + R.FORCE) * W + w] += after * A[(WHOLE + EVENT_GRAVITY) * W + w] * s
 
 
 @law
-def tilted(S, B, n, on):
+def tilted(A, n, on):
     """The coupling sees the angle to the tilted rail, gravity the angle to the vertical."""
-    P, D = B[0], B[1]
     for w in range(n):
-        upright = D[R.MID * W + w] - S[BALANCE * W + w]
+        upright = A[(SECOND + R.MID) * W + w] - A[(WHOLE + BALANCE) * W + w]
         s0, _ = sin_cos(upright)
-        s, c = sin_cos(upright - S[TILT * W + w])
-        rate = D[R.RATE * W + w]
-        coupling = S[COUPLING * W + w]
+        s, c = sin_cos(upright - A[(WHOLE + TILT) * W + w])
+        rate = A[(SECOND + R.RATE) * W + w]
+        coupling = A[(WHOLE + COUPLING) * W + w]
         if on[R.ON_EVENT]:
-            coupling += share_after(S, w) * S[EVENT_COUPLING * W + w]
-        S[M12 * W + w] = -coupling * c
-        P[R.FORCE * W + w] += coupling * (s0 - s) * rate * rate - S[TILT_FORCE * W + w]
+            coupling += _after(A, w) * A[(WHOLE + EVENT_COUPLING) * W + w]
+        A[(WHOLE + M12) * W + w] = -coupling * c
+        A[(FIRST + R.FORCE) * W + w] += coupling * (s0 - s) * rate * rate - A[(WHOLE + TILT_FORCE) * W + w]
 
 
-@part
-def wip_body(S, B, n, on, asked):
+@law
+def wip_body(A, n, on):
     """Wip, cart-pole, pendulum, linear axis."""
-    P, D = B[0], B[1]
     for w in range(n):
-        S[M11 * W + w] = S[MASS * W + w]
-        S[M22 * W + w] = S[INERTIA * W + w]
+        A[(WHOLE + M11) * W + w] = A[(WHOLE + MASS) * W + w]
+        A[(WHOLE + M22) * W + w] = A[(WHOLE + INERTIA) * W + w]
     for w in range(n):
-        s, c = sin_cos(D[R.MID * W + w] - S[BALANCE * W + w])
-        rate = D[R.RATE * W + w]
-        coupling = S[COUPLING * W + w]
-        S[M12 * W + w] = -coupling * c
-        P[R.FORCE * W + w] -= coupling * s * rate * rate
-        D[R.FORCE * W + w] += S[GRAVITY * W + w] * s
+        s, c = sin_cos(A[(SECOND + R.MID) * W + w] - A[(WHOLE + BALANCE) * W + w])
+        rate = A[(SECOND + R.RATE) * W + w]
+        coupling = A[(WHOLE + COUPLING) * W + w]
+        A[(WHOLE + M12) * W + w] = -coupling * c
+        A[(FIRST + R.FORCE) * W + w] -= coupling * s * rate * rate
+        A[(SECOND + R.FORCE) * W + w] += A[(WHOLE + GRAVITY) * W + w] * s
     if on[R.ON_EVENT]:
-        payload_event(S, B, n)
+        payload_event(A, n)
     if on[R.ON_TILT]:
-        tilted(S, B, n, on)
+        tilted(A, n, on)
 
 
-@part
-def double_body(S, B, n, on, asked):
+@law
+def double_body(A, n):
     """Double pendulum, theta1 = 0 hanging."""
-    P, D = B[0], B[1]
     for w in range(n):
-        s2, c2 = sin_cos(D[R.MID * W + w])
-        s1, _ = sin_cos(P[R.MID * W + w])
-        s12, _ = sin_cos(P[R.MID * W + w] + D[R.MID * W + w])
-        v1, v2 = P[R.RATE * W + w], D[R.RATE * W + w]
-        h = S[DP_COUPLING * W + w]
-        elbow = S[DP_ELBOW * W + w]
-        S[M11 * W + w] = S[DP_BASE * W + w] + 2.0 * h * c2 + P[R.ROTOR * W + w]
-        S[M12 * W + w] = elbow + h * c2
-        S[M22 * W + w] = elbow + D[R.ROTOR * W + w]
-        lower = S[DP_GRAVITY * W + w] * s12
-        P[R.FORCE * W + w] += h * s2 * (2.0 * v1 + v2) * v2 - S[DP_GRAVITY1 * W + w] * s1 - lower
-        D[R.FORCE * W + w] += -h * s2 * v1 * v1 - lower
+        s2, c2 = sin_cos(A[(SECOND + R.MID) * W + w])
+        s1, _ = sin_cos(A[(FIRST + R.MID) * W + w])
+        s12, _ = sin_cos(A[(FIRST + R.MID) * W + w] + A[(SECOND + R.MID) * W + w])
+        v1, v2 = A[(FIRST + R.RATE) * W + w], A[(SECOND + R.RATE) * W + w]
+        h = A[(WHOLE + DP_COUPLING) * W + w]
+        elbow = A[(WHOLE + DP_ELBOW) * W + w]
+        A[(WHOLE + M11) * W + w] = A[(WHOLE + DP_BASE) * W + w] + 2.0 * h * c2 + A[(FIRST + R.ROTOR) * W + w]
+        A[(WHOLE + M12) * W + w] = elbow + h * c2
+        A[(WHOLE + M22) * W + w] = elbow + A[(SECOND + R.ROTOR) * W + w]
+        lower = A[(WHOLE + DP_GRAVITY) * W + w] * s12
+        A[(FIRST + R.FORCE) * W + w] += h * s2 * (2.0 * v1 + v2) * v2 - A[(WHOLE + DP_GRAVITY1) * W + w] * s1 - lower
+        A[(SECOND + R.FORCE) * W + w] += -h * s2 * v1 * v1 - lower

@@ -21,12 +21,18 @@ from wipx.effects.catalogue import kind_of, kinds
 from wipx.effects.payload import loaded
 from wipx.sim import body as B
 from wipx.sim import rows as R
+from wipx.sim.cache import part
 from wipx.sim.tree import code
 from wipx.sim.tree import equations as E
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
 NO_LIMIT = 1e12  # [N m or N] of a drive without one
 ON = "ON_"  # names of flags begin so
+
+
+@part
+def no_tree(S, B, n, on, asked):
+    """Stand for the code of a tree where there is none."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +44,7 @@ class Coefficients:
         joints: And those of each joint, shape (N, BLOCK, P).
         on: Parts of the whole robot that are switched on, shape (FLAGS,).
         has: And of each joint, shape (N, JOINT_FLAGS).
-        rigid: Code of the rigid body (`wipx.sim.cache.part`).
+        rigid: Code of a tree (`wipx.sim.cache.part`).
     """
 
     body: np.ndarray
@@ -82,10 +88,10 @@ class _Filler:
                     for i, each in enumerate(np.atleast_2d(value), row_at(row, site)):
                         rows[i] = rows[i] + each if (j, i) in filled else each
                         filled.add((j, i))
-            for part in effect.parts(values) if callable(effect.parts) else effect.parts:
-                for j in joints_of(f"{ON}{part}", site, self.plant):
+            for stage in effect.parts(values) if callable(effect.parts) else effect.parts:
+                for j in joints_of(f"{ON}{stage}", site, self.plant):
                     flags = self.on if j < 0 else self.has[j]
-                    flags[row_at(f"{ON}{part}", site)] = True
+                    flags[row_at(f"{ON}{stage}", site)] = True
 
 
 def _rows(effect: Effect, values: Columns, body: Columns) -> Iterator[tuple[str, np.ndarray]]:
@@ -132,6 +138,7 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     for site, speed in zip(plant.joints, smoothing, strict=False):
         f.joints[joint_index(plant, site), R.SMOOTHING] = speed
         f.on[R.ON_SMOOTHING] = True
+    f.has[:, R.ON_PATH] = f.has[:, list(R.PATH)].any(axis=1)
     f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
     f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
     f.on[R.ON_TIME] |= f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
@@ -186,7 +193,7 @@ def _wip_family(f: _Filler) -> Any:
         for row, after, before in zip(deltas, loaded_body, plain, strict=True):
             f.body[row] = after - before
     f.body[B.TILT_FORCE] = plain[4]
-    return B.wip_body
+    return no_tree
 
 
 def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
@@ -233,7 +240,8 @@ def _double_pendulum(f: _Filler) -> Any:
     f.body[B.DP_COUPLING] = mass2 * length1 * com2
     f.body[B.DP_GRAVITY] = mass2 * com2 * gravity
     f.body[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
-    return B.double_body
+    f.on[R.ON_DOUBLE] = True
+    return no_tree
 
 
 def _tree(f: _Filler, tree: Tree) -> Any:
@@ -252,6 +260,7 @@ def _tree(f: _Filler, tree: Tree) -> Any:
         f.joints[i, [R.LEVEL_PLUS, R.LEVEL_MINUS]] += friction
         f.on[R.ON_DAMPING] |= bool(damping.any())
         f.on[R.ON_FRICTION] |= bool(friction.any())
+    f.on[R.ON_TREE] = True
     return code.rigid_body(tree)
 
 

@@ -8,7 +8,7 @@ step, half a step of whose drift is taken back: together that is the kernel's po
 
 from wipx.core.law import law
 from wipx.sim import rows as R
-from wipx.sim.body import share_after
+from wipx.sim.body import EVENT_TIME, share_after
 from wipx.sim.cache import cached
 from wipx.sim.kernel import begin_row, replay, respond, set_step, step
 from wipx.sim.rows import W
@@ -63,11 +63,11 @@ def begin(
 
 
 @cached
-def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, rigid):
+def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, rigid):
     """Step s of a row up to the forces that act in mid-step, and where the engine is to stand."""
     if s == 0 or s >= least:
         set_step(S, B, n, has, counts, s)
-    step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
+    step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
     for w in range(n):
         X.duration[w] = S[R.STEP * W + w]
     for j in range(len(has)):
@@ -79,11 +79,11 @@ def before(S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, 
                 X.duration[w] = 0.0
     if on[R.ON_EVENT]:
         for w in range(n):
-            X.loaded[w] = share_after(S, w)
+            X.loaded[w] = share_after(S[R.STEP * W + w], S[R.TIME * W + w], S[EVENT_TIME * W + w])
 
 
 @cached
-def between(S, B, n, X, on, has, rigid):
+def between(A, S, B, n, X, on, has, rigid):
     """The rates at the end of the step from the engine's mass matrix and bias, and the force that leads there."""
     joints = len(has)
     for i in range(joints):
@@ -93,7 +93,7 @@ def between(S, B, n, X, on, has, rigid):
                 S[row_of(i, j) * W + w] = X.mass[i, j, w] + (X.rotor[i, w] if i == j else 0.0)
         for w in range(n):
             J[R.FORCE * W + w] -= X.bias[i, w]
-    respond(S, B, n, on, has, rigid)
+    respond(A, S, B, n, on, has, rigid)
     for i in range(joints):
         J = B[i]
         for w in range(n):

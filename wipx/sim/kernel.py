@@ -17,6 +17,7 @@ import numpy as np
 from wipx.core.law import inlined, law, relaxing
 from wipx.sim import rows as R
 from wipx.sim.actuator import actuator_path, delayed_command
+from wipx.sim.body import double_body, wip_body
 from wipx.sim.cache import cached
 from wipx.sim.joints import arrived, drifted, levels, smooth_friction
 from wipx.sim.rows import TOGETHER, W
@@ -31,14 +32,14 @@ def filled(count):
 
 
 @inlined
-def respond(S, B, n, on, has, rigid):
+def respond(A, S, B, n, on, has, rigid):
     """Friction, and the motion under all forces; the rigid body's mass matrix and forces are known."""
     for j in range(len(has)):
         if has[j, R.ON_LAWS]:
             J = B[j]
             levels(J, n, has, j)
             smooth_friction(S, B, J, n, has, j)
-    rates_at_the_end(S, B, n, on, has, rigid)
+    rates_at_the_end(A, S, B, n, on, has, rigid)
     for j in range(len(has)):
         arrived(B[j], n, has, j)
     if on[R.ON_TIME]:
@@ -47,7 +48,7 @@ def respond(S, B, n, on, has, rigid):
 
 
 @inlined
-def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
+def step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
     """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit.
 
     Where an engine moves the rigid body, this ends with the forces that act on it.
@@ -60,7 +61,7 @@ def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
         elif on[R.ON_RAMP]:
             for w in range(n):
                 J[R.DRIVE * W + w] += J[R.RAMP * W + w] * S[R.PHASE * W + w]
-        if has[j, R.ACTUATED]:
+        if has[j, R.ON_PATH] or (on[R.ON_REPORT] and has[j, R.ACTUATED]):
             actuator_path(S, J, n, on, has, j)
         loaded(J, n, on, has, j)
     if on[R.ON_RAMP]:
@@ -68,8 +69,13 @@ def step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
             S[R.PHASE * W + w] += S[R.PER_ROW * W + w]
     if on[R.ON_ENGINE]:
         return
-    rigid(S, B, n, on, R.FORCES)
-    respond(S, B, n, on, has, rigid)
+    if on[R.ON_TREE]:
+        rigid(S, B, n, on, R.FORCES)
+    elif on[R.ON_DOUBLE]:
+        double_body(A, n)
+    else:
+        wip_body(A, n, on)
+    respond(A, S, B, n, on, has, rigid)
 
 
 @inlined
@@ -210,7 +216,7 @@ def rollout(
         blocks: And those of each joint, shape (N, BLOCK, P).
         on: Parts of the whole robot that are present, shape (FLAGS,).
         has: And of each joint, shape (N, JOINT_FLAGS).
-        rigid: Code of the rigid body (`wipx.sim.cache.part`).
+        rigid: Code of a tree (`wipx.sim.cache.part`); not called for the other plants.
         states: Start of each lane, shape (N, STATES, lanes); overwritten with the end.
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, N, lanes) if `per_lane` (written in closed loop), else (K, N, R).
@@ -241,7 +247,8 @@ def rollout(
     """
     windows = substeps.shape[1]
     joints = len(has)
-    S, B = np.zeros(len(body) * W), np.zeros((joints, R.BLOCK * W))
+    A = np.zeros((joints * R.BLOCK + len(body)) * W)
+    B, S = A[: joints * R.BLOCK * W].reshape((joints, R.BLOCK * W)), A[joints * R.BLOCK * W :]
     pointers = np.zeros((joints, W), dtype=np.int64)
     counts = np.zeros(W, dtype=np.int64)
     lanes = np.zeros((2, W), dtype=np.int64)
@@ -277,7 +284,7 @@ def rollout(
             for s in range(most):
                 if s == 0 or s >= least:
                     set_step(S, B, n, has, counts, s)
-                step(S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
+                step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)
         record(B, n, on, past, t_rows, lanes, last_row, out, lane0, count)

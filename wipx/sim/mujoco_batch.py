@@ -22,7 +22,7 @@ from wipx.sim.stepped import single
 LONGER = 4.0  # steps of the loop in one
 EVEN = 1e-9  # relative spread of the steps of a window that counts as even
 BLOCK = 256  # rollouts held in memory at once
-RIGID = (R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
+RIGID = (R.ON_DOUBLE, R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
 
 
 def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) -> bool:
@@ -37,7 +37,7 @@ def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) 
     known = coefficients(batch)
     on, has = known.on.copy(), known.has.copy()
     on[list(RIGID)] = False
-    has[:, [R.ACTUATED, R.ON_GAIN]] = False
+    has[:, [R.ACTUATED, R.ON_PATH, R.ON_GAIN]] = False
     if on.any() or has.any() or inputs.ramps is not None or not np.isfinite(initial).all():
         return False
     return _Steps.of(inputs, step).even

@@ -129,8 +129,7 @@ class _Block:
 
     Attributes:
         exchange: Between the laws and the engine.
-        body: Rows of the whole robot, shape (rows W,).
-        joints: Rows of each joint, shape (N, BLOCK W).
+        rows: Of the joints, then of the whole robot, shape (all W,).
         lanes: Window and column of the commands of every lane, shape (2, W).
         pointers: Row whose command is just leaving the transport delay, by joint, shape (N, W).
         counts: Steps of the present row, shape (W,).
@@ -139,13 +138,23 @@ class _Block:
     """
 
     exchange: Exchange
-    body: np.ndarray
-    joints: np.ndarray
+    rows: np.ndarray
     lanes: np.ndarray
     pointers: np.ndarray
     counts: np.ndarray
     first: int
     count: int
+
+    @property
+    def joints(self) -> np.ndarray:
+        """Rows of each joint, a view of shape (N, BLOCK W)."""
+        width = len(self.exchange.lanes.place)
+        return self.rows[: width * R.BLOCK * W].reshape(width, -1)
+
+    @property
+    def body(self) -> np.ndarray:
+        """Rows of the whole robot, a view of shape (rows W,)."""
+        return self.rows[len(self.exchange.lanes.place) * R.BLOCK * W :]
 
 
 class _Run:
@@ -206,13 +215,12 @@ class _Run:
         count = min(W, self.inputs.windows - window)
         windows = window + np.minimum(np.arange(W), count - 1)
         lanes = p * self.inputs.windows + windows
-        body = np.repeat(self.coefficients.body[:, p], W)
         joints = np.repeat(self.coefficients.joints[:, :, p, None], W, axis=2)
         joints[:, : R.STATES] = states[:, :, lanes]
+        body = np.repeat(self.coefficients.body[:, p], W)
         return _Block(
             Exchange.of(self.layout.joints, self.layout.width),
-            body,
-            joints.reshape(self.layout.width, -1),
+            np.concatenate([joints.ravel(), body]),
             np.stack([windows, lanes if own else windows]).astype(np.int64),
             np.zeros((self.layout.width, W), dtype=np.int64),
             np.zeros(W, dtype=np.int64),
@@ -225,7 +233,7 @@ class _Run:
     ) -> None:
         """Simulate every row of a block."""
         on, has, rigid, t = self.coefficients.on, self.coefficients.has, self.coefficients.rigid, self.inputs.t
-        S, B, X = block.body, block.joints, block.exchange.lanes
+        A, S, B, X = block.rows, block.body, block.joints, block.exchange.lanes
         lanes, pointers, counts = block.lanes, block.pointers, block.counts
         first, count = block.first, block.count
         closed = loop is not None
@@ -259,9 +267,9 @@ class _Run:
                 loop.settings,
             )
             for s in range(most):
-                before(S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, rigid)
+                before(A, S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, rigid)
                 world.weigh()
-                between(S, B, n, X, on, has, rigid)
+                between(A, S, B, n, X, on, has, rigid)
                 world.advance()
                 after(S, B, n, X)
         show(B, n, on, self.past, t, lanes, self.layout.rows, out, first, count, led, until)

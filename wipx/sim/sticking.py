@@ -27,30 +27,6 @@ def row_of(i, j):
 
 
 @inlined
-def rates_at_the_end(S, B, n, on, has, rigid):
-    """Solve for the rates at the end of the step, and for the inverse mass of joints that ask for it."""
-    joints = len(has)
-    if on[R.ON_DAMPING]:
-        for j in range(joints):
-            J, M = B[j], S[row_of(j, j) * W : row_of(j, j) * W + W]
-            for w in range(n):
-                M[w] += 0.5 * J[R.H * W + w] * J[R.DAMPING * W + w]
-                J[R.FORCE * W + w] -= J[R.DAMPING * W + w] * J[R.V * W + w]
-    if on[R.ON_SMOOTHING]:  # a joint that yields while it "sticks" is a compliance in series
-        for j in range(joints):
-            J = B[j]
-            for w in range(n):
-                reach = J[R.H * W + w] * (J[R.PLUS * W + w] + J[R.MINUS * W + w])
-                J[R.YIELD * W + w] = 2.0 * J[R.SMOOTHING * W + w] / maximum(reach, 1e-15)
-    if joints == 1:
-        one_joint(S, B, n, on)
-    elif joints == 2:
-        two_joints(S, B, n, on)
-    else:
-        many_joints(S, B, n, on, has, rigid)
-
-
-@law
 def one_joint(S, B, n, on):
     """The closed form for one joint."""
     J = B[0]
@@ -65,36 +41,36 @@ def one_joint(S, B, n, on):
             J[R.NEXT * W + w] = b + inverse * p
 
 
-@law
-def two_joints(S, B, n, on):
+@inlined
+def two_joints(A, n, on):
     """The closed form for two joints."""
-    P, D = B[0], B[1]  # proximal, distal
+    second, whole = R.BLOCK, 2 * R.BLOCK  # rows of the second joint, and of the whole robot
     for w in range(n):
-        h = S[R.STEP * W + w]
-        a11 = S[R.COMMON * W + w]
-        a12 = S[(R.COMMON + 1) * W + w]
-        a22 = S[(R.COMMON + 2) * W + w]
-        r0, r1 = h * P[R.FORCE * W + w], h * D[R.FORCE * W + w]
+        h = A[(whole + R.STEP) * W + w]
+        a11 = A[(whole + R.COMMON) * W + w]
+        a12 = A[(whole + R.COMMON + 1) * W + w]
+        a22 = A[(whole + R.COMMON + 2) * W + w]
+        r0, r1 = h * A[R.FORCE * W + w], h * A[(second + R.FORCE) * W + w]
         inverse = 1.0 / (a11 * a22 - a12 * a12)
-        P[R.INVERSE * W + w] = a22 * inverse
-        S[R.CROSS * W + w] = -a12 * inverse
-        D[R.INVERSE * W + w] = a11 * inverse
-        P[R.NEXT * W + w] = P[R.V * W + w] + (a22 * r0 - a12 * r1) * inverse
-        D[R.NEXT * W + w] = D[R.V * W + w] + (a11 * r1 - a12 * r0) * inverse
+        A[R.INVERSE * W + w] = a22 * inverse
+        A[(whole + R.CROSS) * W + w] = -a12 * inverse
+        A[(second + R.INVERSE) * W + w] = a11 * inverse
+        A[R.NEXT * W + w] = A[R.V * W + w] + (a22 * r0 - a12 * r1) * inverse
+        A[(second + R.NEXT) * W + w] = A[(second + R.V) * W + w] + (a11 * r1 - a12 * r0) * inverse
     if not on[R.ON_FRICTION]:
         return
     for w in range(n):
-        h = S[R.STEP * W + w]
-        w11, w12, w22 = P[R.INVERSE * W + w], S[R.CROSS * W + w], D[R.INVERSE * W + w]
-        b0, b1 = P[R.NEXT * W + w], D[R.NEXT * W + w]
-        low0, high0 = -h * P[R.PLUS * W + w], h * P[R.MINUS * W + w]
-        low1, high1 = -h * D[R.PLUS * W + w], h * D[R.MINUS * W + w]
-        c11, c22 = w11 + P[R.YIELD * W + w], w22 + D[R.YIELD * W + w]
+        h = A[(whole + R.STEP) * W + w]
+        w11, w12, w22 = A[R.INVERSE * W + w], A[(whole + R.CROSS) * W + w], A[(second + R.INVERSE) * W + w]
+        b0, b1 = A[R.NEXT * W + w], A[(second + R.NEXT) * W + w]
+        low0, high0 = -h * A[R.PLUS * W + w], h * A[R.MINUS * W + w]
+        low1, high1 = -h * A[(second + R.PLUS) * W + w], h * A[(second + R.MINUS) * W + w]
+        c11, c22 = w11 + A[R.YIELD * W + w], w22 + A[(second + R.YIELD) * W + w]
         both_stick = (w12 * b0 - c11 * b1) / (c11 * c22 - w12 * w12)
         p0 = clip(-(b0 + w12 * clip(both_stick, low1, high1)) / c11, low0, high0)
         p1 = clip(-(b1 + w12 * p0) / c22, low1, high1)
-        P[R.NEXT * W + w] = b0 + w11 * p0 + w12 * p1
-        D[R.NEXT * W + w] = b1 + w12 * p0 + w22 * p1
+        A[R.NEXT * W + w] = b0 + w11 * p0 + w12 * p1
+        A[(second + R.NEXT) * W + w] = b1 + w12 * p0 + w22 * p1
 
 
 @law
@@ -200,3 +176,27 @@ def inverse_mass(S, B, n, on, joints, j, rigid):
             if i == j:
                 J[R.INVERSE * W + w] = J[R.NEXT * W + w]
             J[R.NEXT * W + w] = J[R.AIM * W + w]
+
+
+@inlined
+def rates_at_the_end(A, S, B, n, on, has, rigid):
+    """Solve for the rates at the end of the step, and for the inverse mass of joints that ask for it."""
+    joints = len(has)
+    if on[R.ON_DAMPING]:
+        for j in range(joints):
+            J, M = B[j], S[row_of(j, j) * W : row_of(j, j) * W + W]
+            for w in range(n):
+                M[w] += 0.5 * J[R.H * W + w] * J[R.DAMPING * W + w]
+                J[R.FORCE * W + w] -= J[R.DAMPING * W + w] * J[R.V * W + w]
+    if on[R.ON_SMOOTHING]:  # a joint that yields while it "sticks" is a compliance in series
+        for j in range(joints):
+            J = B[j]
+            for w in range(n):
+                reach = J[R.H * W + w] * (J[R.PLUS * W + w] + J[R.MINUS * W + w])
+                J[R.YIELD * W + w] = 2.0 * J[R.SMOOTHING * W + w] / maximum(reach, 1e-15)
+    if joints == 1:
+        one_joint(S, B, n, on)
+    elif joints == 2:
+        two_joints(A, n, on)
+    else:
+        many_joints(S, B, n, on, has, rigid)
