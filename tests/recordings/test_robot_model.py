@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wipx.core.drive import Drive
 from wipx.core.errors import InputError
 from wipx.core.model import ModelBatch
 from wipx.effects.catalogue import vocabulary
@@ -132,3 +133,18 @@ def test_arms_of_public_recordings_are_read(arm: str):
     robot = read_robot(folder / "robot.yaml")
     assert len(robot.model.plant.joints) == 6
     assert robot.model.plant.commands == tuple(f"u_{joint}" for joint in robot.model.plant.joints)
+
+
+def test_a_joint_that_is_left_out_has_the_drive_of_the_file(tmp_path: Path):
+    actuators = '<motor joint="shoulder" gear="50"/><position joint="wrist" kp="30" kv="2" forcerange="-3 3"/>'
+    arm = ARM.replace('<motor joint="shoulder"/>', actuators)
+    written(tmp_path / "arm.xml", arm)
+    plain = written(tmp_path / "robot.yaml", "plant: robot\nmodel: arm.xml\n")
+    drives = read_robot(plain).model.plant.drives
+    assert drives["shoulder"] == Drive("torque", gain=50.0)
+    assert drives["wrist"] == Drive("position", kp=30.0, kd=2.0, limit=3.0)
+    said = written(tmp_path / "robot.yaml", "plant: robot\nmodel: arm.xml\ndrives: {wrist: {kind: torque}}\n")
+    assert read_robot(said).model.plant.drives["wrist"] == Drive("torque")
+    written(tmp_path / "arm.xml", arm.replace('kp="30"', 'kp="30" gear="2"'))
+    with pytest.raises(InputError, match="neither the only motor nor the only position servo"):
+        read_robot(plain)

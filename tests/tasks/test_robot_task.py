@@ -43,13 +43,14 @@ def robot(tmp_path: Path) -> Path:
 
 def test_named_effects_are_identified_and_predict(program, robot: Path, tmp_path: Path):
     named = "effects=[shoulder/coulomb,actuator_elbow/gain,wrist/viscous]"
-    common = ("friction=none", "optimizer.starts=1", f"recordings.path={robot}")
+    common = ("free={hand.mass: 0.1}", "friction=none", "optimizer.starts=1", f"recordings.path={robot}")
     answer = program("task=identify", named, *common, "hydra.run.dir=out")
     assert (answer.status, answer.error) == (0, "")
     found = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))["parameters"]
     for effect, numbers in HIDDEN.items():
         for symbol, value in numbers.items():
             assert found[f"{effect}.{symbol}"]["value"] == pytest.approx(value, rel=0.03)
+    assert found["hand.mass"]["value"] == pytest.approx(0.2, rel=0.03)
     predict = ("task=predict", "model.path=out/model.yaml", f"recordings.path={robot}", "hydra.run.dir=seen")
     assert program(*predict).status == 0
     seen = json.loads((tmp_path / "seen" / "metrics.json").read_text(encoding="utf-8"))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wipx.core.drive import Drive
 from wipx.core.errors import InputError
 from wipx.core.tree import Link, Tree
 
@@ -13,7 +14,7 @@ from wipx.core.tree import Link, Tree
 def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
     """The tree of links in a model file.
 
-    Meshes and textures need not be there; contacts, actuators and sensors of the file are not part of the tree.
+    Meshes and textures need not be there; contacts and sensors of the file are not part of the tree.
 
     Args:
         path: MJCF or URDF.
@@ -24,6 +25,44 @@ def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
             and slides on a fixed base.
     """
     mujoco = _mujoco(path)
+    return _tree(mujoco, _model(mujoco, path), dict(locked or {}), path)
+
+
+def read_drives(path: Path) -> dict[str, Drive]:
+    """The actuators of a model file as drives, by joint.
+
+    Raises:
+        InputError: as `read_tree`; or an actuator is neither a motor nor a position servo of one joint.
+    """
+    mujoco = _mujoco(path)
+    model = _model(mujoco, path)
+    found: dict[str, Drive] = {}
+    for i in range(model.nu):
+        gain, bias, gear = model.actuator_gainprm[i], model.actuator_biasprm[i], model.actuator_gear[i]
+        limit = float(np.max(np.abs(model.actuator_forcerange[i]))) if model.actuator_forcelimited[i] else None
+        plain = (
+            model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
+            and model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE
+            and model.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_FIXED
+        )
+        motor = model.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_NONE
+        servo = gain[0] > 0.0 and bias[0] == 0.0 and bias[1] == -gain[0] and gear[0] == 1.0
+        joint = model.joint(int(model.actuator_trnid[i, 0])).name if plain else ""
+        if not plain or not (motor or servo) or joint in found:
+            name = model.actuator(i).name or i + 1
+            raise InputError(
+                f"{path}: actuator {name} is neither the only motor nor the only position servo (gear 1) of a joint; "
+                f"remove it from the file and describe the drive in robot.yaml"
+            )
+        if motor:
+            found[joint] = Drive("torque", gain=float(gain[0] * gear[0]))
+        else:
+            found[joint] = Drive("position", kp=float(gain[0]), kd=float(-bias[2]), limit=limit)
+    return found
+
+
+def _model(mujoco: Any, path: Path) -> Any:
+    """The compiled model of a file."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of an MJCF or URDF file relative to robot.yaml")
     try:
@@ -35,8 +74,8 @@ def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
         model = spec.compile()
     except ValueError as error:
         raise InputError(f"{path}: {_first_line(error)}; correct the file") from error
-    _refuse(mujoco, model, path)
-    return _tree(mujoco, model, dict(locked or {}), path)
+    _refuse(model, path)
+    return model
 
 
 def _mujoco(path: Path) -> Any:
@@ -51,9 +90,9 @@ def _first_line(error: Exception) -> str:
 
 
 def _strip(mujoco: Any, spec: Any, path: Path) -> None:
-    """Leave only what moves: joints and inertias."""
+    """Leave only what moves: joints, inertias and actuators."""
     _refuse_joints(mujoco, spec, path)
-    lists = (spec.actuators, spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras)
+    lists = (spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras)
     _delete(spec, *lists)
     for body in spec.bodies[1:]:
         mesh = mujoco.mjtGeom.mjGEOM_MESH
@@ -86,7 +125,7 @@ def _refuse_joints(mujoco: Any, spec: Any, path: Path) -> None:
         raise InputError(f"{path}: tendon {spec.tendons[0].name or 1} is not supported; remove it from the file")
 
 
-def _refuse(mujoco: Any, model: Any, path: Path) -> None:
+def _refuse(model: Any, path: Path) -> None:
     """Refuse what no tree of rigid links is."""
     if model.njnt == 0:
         raise InputError(f"{path}: the model has no joint that moves")

@@ -10,7 +10,7 @@ from wipx.core.drive import Drive, Logged
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.plant import Plant, robot_plant
 from wipx.core.tree import Link, Tree
-from wipx.recordings.robot_model import read_tree
+from wipx.recordings.robot_model import read_drives, read_tree
 from wipx.recordings.strict_yaml import finite_number
 
 DRIVE_KEYS = {
@@ -32,6 +32,7 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
     Raises:
         InputError: the model file or a drive is missing or at fault.
     """
+    own: dict[str, Drive] = {}
     if data.get("tree") is not None:
         tree = _tree(cast(Mapping[str, Any], data["tree"]))
     else:
@@ -39,13 +40,15 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
         if not isinstance(model, str) or not model:
             raise InputError(f"{where}: model is {model!r}, expected the path of an MJCF or URDF file")
         tree = read_tree(folder / model, _locked(data.get("locked"), where))
+        own = {joint: drive for joint, drive in read_drives(folder / model).items() if joint in tree.joints}
     drives = data.get("drives") or {}
     if not isinstance(drives, Mapping):
         raise InputError(f"{where}: drives is {drives!r}, expected joints with their drives")
     for joint in drives:
         if joint not in tree.joints:
             raise unknown_name("joint", str(joint), tree.joints, f"{where}: drives")
-    return robot_plant(tree, {str(joint): _drive(drives[joint], f"{where}: drives: {joint}") for joint in drives})
+    said = {str(joint): _drive(drives[joint], f"{where}: drives: {joint}") for joint in drives}
+    return robot_plant(tree, {**own, **said})
 
 
 def plant_to_mapping(plant: Plant) -> dict[str, object]:

@@ -9,6 +9,7 @@ import numpy as np
 from wipx.baselines.case import Answer, Baseline, Found, Problem
 from wipx.baselines.learned_simulator import learned_simulator
 from wipx.core.effect import Effect
+from wipx.core.errors import InputError
 from wipx.core.plant import Plant
 from wipx.core.results import HORIZON, FitErrors
 from wipx.effects.catalogue import effect_of, kind_of
@@ -30,6 +31,8 @@ class RunBaseline:
         """Write diagnosis.json, model.yaml and, of a baseline that learned one, the network."""
         source: RecordingSource = job.part("recordings")
         description = source.describe()
+        if description.model.plant.tree is not None:
+            raise InputError(f"{source.path}: baselines cannot do a robot from a model file yet")
         nominal = job.part("plant").nominal(description.model)
         recordings = source.load()
         check_long_enough(recordings)
