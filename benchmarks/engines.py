@@ -17,6 +17,7 @@ from wipx.core.plant import plant_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.bullet import BulletSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.mechanism import mechanism
 from wipx.sim.mujoco import MujocoSimulator
 from wipx.sim.simulator import Simulator
 from wipx.sim.urdf import urdf
@@ -56,7 +57,7 @@ def bullet_loop() -> Iterator[BulletLoop]:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "wip.urdf")
-            path.write_text(urdf(wip("rigid body alone")), encoding="utf-8")
+            path.write_text(urdf(mechanism(wip("rigid body alone")), "wip"), encoding="utf-8")
             body = pybullet.loadURDF(
                 str(path), useFixedBase=True, flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client
             )

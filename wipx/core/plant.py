@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from wipx.core.drive import Drive
 from wipx.core.errors import InputError, unknown_name
-from wipx.core.tree import Tree
+from wipx.core.tree import Link, Tree
 
 COMMON_SITES = ("actuator", "geometry", "environment")
 
@@ -86,7 +86,7 @@ class Plant:
         if self.tree is None:
             return (*self.joints, *COMMON_SITES, *sensors)
         drives = tuple(f"actuator_{joint}" for joint in self.actuated)
-        links = tuple(f"link_{link.body}" for link in self.tree.links)
+        links = tuple(f"link_{link.body}" for link in self.tree.links if link.mass)
         return (*self.joints, "actuator", *drives, *sensors, *links, "environment")
 
     def shows(self, site: str, kind: str) -> bool:
@@ -256,6 +256,17 @@ def plant_of(kind: str, where: str = "plant") -> Plant:
     return PLANTS[kind]
 
 
+def _link_numbers(link: Link) -> dict[str, PlantParameter]:
+    """Numbers of a link of a robot from a model file."""
+    body = link.body
+    com = link.body_rotation.T @ (link.com - link.body_place)
+    numbers = {f"{body}.mass": PlantParameter("kg", f"mass of {body}", link.mass, "non-negative")}
+    for axis, place in zip("xyz", com.tolist(), strict=True):
+        meaning = f"centre of mass of {body} along {axis} of its frame"
+        numbers[f"{body}.com_{axis}"] = PlantParameter("m", meaning, place, "any", absolute=True)
+    return numbers | {f"{body}.inertia": PlantParameter("1", f"scale of the inertia of {body}", 1.0)}
+
+
 def robot_plant(tree: Tree, drives: Mapping[str, Drive]) -> Plant:
     """The plant of a robot that a model file describes; contract section 6.
 
@@ -266,13 +277,8 @@ def robot_plant(tree: Tree, drives: Mapping[str, Drive]) -> Plant:
     full = {link.joint: drives.get(link.joint, Drive()) for link in tree.links}
     parameters: dict[str, PlantParameter] = {}
     for link in tree.links:
-        com = link.body_rotation.T @ (link.com - link.body_place)
-        body = link.body
-        parameters[f"{body}.mass"] = PlantParameter("kg", f"mass of {body}", link.mass, "non-negative")
-        for axis, place in zip("xyz", com.tolist(), strict=True):
-            meaning = f"centre of mass of {body} along {axis} of its frame"
-            parameters[f"{body}.com_{axis}"] = PlantParameter("m", meaning, place, "any", absolute=True)
-        parameters[f"{body}.inertia"] = PlantParameter("1", f"scale of the inertia of {body}", 1.0)
+        if link.mass:
+            parameters |= _link_numbers(link)
         unit = "N s/m" if link.slides else "N m s/rad"
         force, inertia = ("N", "kg") if link.slides else ("N m", "kg m^2")
         for name, of, value in (

@@ -15,7 +15,7 @@ class Link:
 
     Attributes:
         joint: Name of the joint.
-        body: Name of the body; that of the last of several joints between two bodies is the moving one's.
+        body: Name of the body. Between two joints of one body stands a link without mass, named after body and joint.
         parent: Number of the link below, -1 for the ground; always lower than the link's own.
         slides: Whether the joint slides; else it turns.
         rotation: From the link's frame to its parent's, at position zero, shape (3, 3).

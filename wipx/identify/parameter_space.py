@@ -213,8 +213,9 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     if plant.tree is not None:
         body = next(link.body for link in plant.tree.links if link.joint == site)
         reach = [float(np.linalg.norm(link.place)) for link in plant.tree.links if link.place.any()]
-        mass, length = sum(p[f"{link.body}.mass"] for link in plant.tree.links), max(reach, default=1.0)
-        mass = max(p[f"{body}.mass"], 0.1 * mass)
+        length = max(reach, default=1.0)
+        whole = sum(p[f"{link.body}.mass"] for link in plant.tree.links if link.mass)
+        mass = max(p.get(f"{body}.mass", 0.0), 0.1 * whole)
     else:
         mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
         length = p.get("com_height", p.get("link1_length", 1.0))

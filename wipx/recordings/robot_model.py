@@ -171,7 +171,7 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
         links.append(
             Link(
                 joint=joints[j],
-                body=model.body(body).name or f"body{body}",
+                body=_body_name(model, j, body, carrier[body] == i),
                 parent=parent,
                 slides=model.jnt_type[j] == mujoco.mjtJoint.mjJNT_SLIDE,
                 rotation=below_turn.T @ turn,
@@ -191,6 +191,12 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
     tree = Tree(tuple(links), np.array(model.opt.gravity, dtype=float))
     _check_masses(tree, path)
     return tree
+
+
+def _body_name(model: Any, j: int, body: int, moving: bool) -> str:
+    """Name of the link that joint j carries: the body's, or one of its own between two joints of the body."""
+    name = model.body(body).name or f"body{body}"
+    return name if moving else f"{name}_{model.joint(j).name}"
 
 
 def _carriers(model: Any, number: dict[int, int]) -> dict[int, int]:

@@ -11,7 +11,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.sim.exchange import Exchange
-from wipx.sim.mechanism import EVENT, mechanism
+from wipx.sim.mechanism import mechanism
 from wipx.sim.stepped import SteppedSimulator, World
 from wipx.sim.urdf import urdf
 
@@ -75,13 +75,18 @@ class BulletWorld:
     def load(self, model: Model, exchange: Exchange, lanes: int) -> None:
         """See `World`."""
         self.bullet.resetSimulation(physicsClientId=self.client)
-        self.bullet.setGravity(0.0, 0.0, -model.parameters["gravity"], physicsClientId=self.client)
-        links = mechanism(model)
+        found = mechanism(model)
+        links = found.tree.links
+        self.bullet.setGravity(*found.tree.gravity.tolist(), physicsClientId=self.client)
         for link, j in zip(links, range(exchange.joints.start, exchange.joints.stop), strict=True):
-            exchange.lanes.rotor[j] = link.rotor
+            exchange.lanes.rotor[j] = link.armature
         self.joints: list[int] = []
-        self.bare = self._body(urdf(model, with_event=False))
-        self.loaded = self._body(urdf(model, with_event=True)) if f"geometry/{EVENT}" in model.effects else self.bare
+        self.order: list[int] = []
+        names = [link.joint for link in links]
+        self.bare = self._body(urdf(found, model.plant.kind, with_event=False), names)
+        with_event = urdf(found, model.plant.kind, with_event=True)
+        self.loaded = self.bare if found.coming is None else self._body(with_event, names)
+        self.pairs = np.ix_(self.order, self.order)
         self.durations, self.shares = exchange.lanes.duration, exchange.lanes.loaded
         self.lanes = [_Lane.of(exchange, lane) for lane in range(lanes)]
         self.still = [0.0] * len(links)
@@ -97,22 +102,22 @@ class BulletWorld:
             if self.durations[lane] > 0.0:
                 share = self.shares[lane]
                 if share == 0.0 or share == 1.0 or self.loaded == self.bare:
-                    x.mass[:], x.bias[:] = self._weighed(self.bare if share == 0.0 else self.loaded, x)
+                    mass, bias = self._weighed(self.bare if share == 0.0 else self.loaded, x)
                 else:
                     bare, loaded = self._weighed(self.bare, x), self._weighed(self.loaded, x)
-                    x.mass[:] = (1.0 - share) * np.array(bare[0]) + share * np.array(loaded[0])
-                    x.bias[:] = (1.0 - share) * np.array(bare[1]) + share * np.array(loaded[1])
+                    mass, bias = ((1.0 - share) * a + share * b for a, b in zip(bare, loaded, strict=True))
+                x.mass[self.pairs], x.bias[self.order] = mass, bias
 
-    def _weighed(self, body: int, x: _Lane) -> tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]:
-        """Mass matrix and bias forces of a body."""
-        places = x.place.tolist()
+    def _weighed(self, body: int, x: _Lane) -> tuple[np.ndarray, np.ndarray]:
+        """Mass matrix and bias forces of a body, its joints in Bullet's order."""
+        places = x.place[self.order].tolist()
         matrix = self.bullet.calculateMassMatrix(body, places, physicsClientId=self.client)
-        return matrix, self._forces(body, places, x, self.still)
+        return np.array(matrix), np.array(self._forces(body, places, x, self.still))
 
     def _forces(self, body: int, places: list[float], x: _Lane, accelerations: list[float]) -> tuple[float, ...]:
         """What moves a body with these accelerations."""
         return self.bullet.calculateInverseDynamics(
-            body, places, x.speed.tolist(), accelerations, physicsClientId=self.client
+            body, places, x.speed[self.order].tolist(), accelerations, physicsClientId=self.client
         )
 
     def advance(self) -> None:
@@ -125,21 +130,24 @@ class BulletWorld:
                     self.time_step = duration
                     bullet.setTimeStep(duration, physicsClientId=client)
                 body = self.bare if share == 0.0 else self.loaded
-                places, push = x.place.tolist(), x.push.tolist()
+                places, push = x.place[self.order].tolist(), x.push[self.order].tolist()
                 if 0.0 < share < 1.0:  # the payload came within the step: its body moves like one with a part of it
-                    push = self._forces(body, places, x, x.gained.tolist())
-                for joint, place, speed in zip(self.joints, places, x.speed.tolist(), strict=True):
+                    push = self._forces(body, places, x, x.gained[self.order].tolist())
+                for joint, place, speed in zip(self.joints, places, x.speed[self.order].tolist(), strict=True):
                     bullet.resetJointState(body, joint, place, speed, physicsClientId=client)
                 bullet.setJointMotorControlArray(
                     body, self.joints, bullet.TORQUE_CONTROL, forces=push, physicsClientId=client
                 )
                 bullet.stepSimulation(physicsClientId=client)
                 states = bullet.getJointStates(body, self.joints, physicsClientId=client)
-                x.place[:] = [state[0] for state in states]
-                x.speed[:] = [state[1] for state in states]
+                x.place[self.order] = [state[0] for state in states]
+                x.speed[self.order] = [state[1] for state in states]
 
-    def _body(self, text: str) -> int:
-        """Load a body; Bullet's own damping and motors are off, since friction is the laws' business."""
+    def _body(self, text: str, names: list[str]) -> int:
+        """Load a body with joints of these names.
+
+        Bullet's own damping and motors are off, since friction is the laws' business.
+        """
         bullet, client = self.bullet, self.client
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "body.urdf")
@@ -150,8 +158,9 @@ class BulletWorld:
         joints = range(bullet.getNumJoints(body, physicsClientId=client))
         for joint in joints:
             bullet.changeDynamics(body, joint, **undamped, physicsClientId=client)
-        types = {joint: bullet.getJointInfo(body, joint, physicsClientId=client)[2] for joint in joints}
-        self.joints = [joint for joint in joints if types[joint] != bullet.JOINT_FIXED]
+        known = {joint: bullet.getJointInfo(body, joint, physicsClientId=client) for joint in joints}
+        self.joints = [joint for joint in joints if known[joint][2] != bullet.JOINT_FIXED]
+        self.order = [names.index(known[joint][1].decode("utf-8")) for joint in self.joints]
         for joint in self.joints:
             bullet.setJointMotorControl2(body, joint, bullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client)
         return body

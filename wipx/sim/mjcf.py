@@ -3,10 +3,17 @@
 Effects on the signals (delays, scales, biases) are not in it, and friction only where it is asked for.
 """
 
-from wipx.core.model import Model
-from wipx.effects.catalogue import kind_of
-from wipx.sim.mechanism import LEAST, Link, Part, mechanism
+from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
+from wipx.core.model import Model
+from wipx.core.tree import Tree
+from wipx.effects.catalogue import kind_of
+from wipx.sim.mechanism import EVENT, LEAST, ComingLoad, Mechanism, mechanism
+from wipx.sim.tree.frames import NEGLIGIBLE, own_frame, placed, principal
+
+NO_CONTACT = '<flag contact="disable"/>'
 BUILT_IN = ("damping", "frictionloss", "gear")  # parameters of MuJoCo's that effects may be (`Effect.built_in`)
 
 
@@ -19,34 +26,84 @@ def mjcf(model: Model, step: float, *, built_in: tuple[str, ...] = ()) -> str:
         built_in: Those of `BUILT_IN` that the joints and motors shall have; effects that are others, and all by
             default, are left to whoever steps the engine.
     """
-    plant = model.plant
-    gear = model.parameters["input_gain"] * (_own(model, "actuator", "gear", 1.0) if "gear" in built_in else 1.0)
+    plant, found = model.plant, mechanism(model)
+    joints = {link.joint: _built_in(model, link.joint, built_in) for link in found.tree.links}
     motors = "".join(
-        f'<motor name="{command}" joint="{joint}" gear="{gear!r}"/>'
+        f'<motor name={quoteattr(command)} joint={quoteattr(joint)} gear="{_gear(model, joint, built_in)!r}"/>'
         for command, joint in zip(plant.commands, plant.actuated, strict=True)
     )
     sensors = "".join(
-        f'<jointpos name="{column}" joint="{joint}"/>'
+        f"<jointpos name={quoteattr(column)} joint={quoteattr(joint)}/>"
         for joint, column in zip(plant.joints, plant.coordinates, strict=True)
     )
-    bodies = ""
-    for link in reversed(mechanism(model)):
-        bodies = f'<body pos="0 0 {link.up!r}">{_joint(model, link, built_in)}{_masses(link)}{bodies}</body>'
     return (
-        f'<mujoco><size memory="64K"/><option timestep="{step!r}" gravity="0 0 {-model.parameters["gravity"]!r}" '
-        f'tolerance="1e-10"><flag contact="disable"/></option><worldbody>{bodies}</worldbody>'
+        f'<mujoco><size memory="64K"/>{option(found.tree, step, NO_CONTACT)}'
+        f"<worldbody>{bodies(found, joints)}</worldbody>"
         f"<actuator>{motors}</actuator><sensor>{sensors}</sensor></mujoco>"
     )
 
 
-def _joint(model: Model, link: Link, built_in: tuple[str, ...]) -> str:
-    axis = " ".join(repr(x) for x in link.axis)
-    damping = _own(model, link.joint, "damping", 0.0) if "damping" in built_in else 0.0
-    friction = _own(model, link.joint, "frictionloss", 0.0) if "frictionloss" in built_in else 0.0
-    return (
-        f'<joint name="{link.joint}" type="{"slide" if link.slides else "hinge"}" axis="{axis}" '
-        f'armature="{link.rotor!r}" damping="{damping!r}" frictionloss="{friction!r}"/>'
-    )
+def option(tree: Tree, step: float, flags: str = "") -> str:
+    """The element with gravity and the step [s]."""
+    return f'<option timestep="{step!r}" gravity="{_text(tree.gravity)}" tolerance="1e-10">{flags}</option>'
+
+
+def bodies(found: Mechanism, joints: dict[str, str]) -> str:
+    """The bodies of a mechanism in their own frames, each inside of the one that carries it.
+
+    Args:
+        found: Links and a payload that comes.
+        joints: Further attributes of the joints, by name.
+    """
+    tree = found.tree
+    frames = [own_frame(link) for link in tree.links]
+    texts = [""] * len(tree.links)
+    for i in reversed(range(len(tree.links))):
+        link, frame = tree.links[i], frames[i]
+        turn, place = placed(tree, frames, i)
+        com, inertia = frame.inside(link.com), frame.turn.T @ link.inertia @ frame.turn
+        coming = _coming(found.coming) if found.coming is not None and found.coming.link == i else ""
+        texts[i] = (
+            f"<body name={quoteattr(link.body)}{_attribute('pos', place)}{_axes(turn)}>"
+            f"{_inertial(link.mass, com, inertia)}"
+            f'<joint name={quoteattr(link.joint)} type="{"slide" if link.slides else "hinge"}"'
+            f'{_attribute("pos", frame.anchor)} axis="{_text(frame.axis)}" armature="{link.armature!r}"'
+            f"{joints.get(link.joint, '')}/>{coming}{''.join(texts[k] for k in _carried(tree, i))}</body>"
+        )
+    return "".join(texts[k] for k in _carried(tree, -1))
+
+
+def _carried(tree: Tree, i: int) -> list[int]:
+    return [k for k, link in enumerate(tree.links) if link.parent == i]
+
+
+def _coming(load: ComingLoad) -> str:
+    return f'<body name="{EVENT}">{_inertial(load.mass, load.place, np.zeros((3, 3)))}</body>'
+
+
+def _inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> str:
+    moments, axes = principal(inertia, LEAST)
+    return f'<inertial pos="{_text(com)}"{_axes(axes)} mass="{max(mass, LEAST)!r}" diaginertia="{_text(moments)}"/>'
+
+
+def _gear(model: Model, joint: str, built_in: tuple[str, ...]) -> float:
+    """Force of a drive per unit of its command."""
+    plant = model.plant
+    if plant.tree is not None:
+        gain, site = model.parameters.get(f"{joint}.gain", 1.0), f"actuator_{joint}"
+    else:
+        gain, site = model.parameters["input_gain"], "actuator"
+    return gain * (_own(model, site, "gear", 1.0) if "gear" in built_in else 1.0)
+
+
+def _built_in(model: Model, joint: str, built_in: tuple[str, ...]) -> str:
+    """Damping and dry friction of a joint, as far as they are asked for."""
+    found = ""
+    for attribute, parameter in (("damping", "damping"), ("frictionloss", "friction")):
+        if attribute in built_in:
+            file = model.parameters.get(f"{joint}.{parameter}", 0.0)
+            found += f' {attribute}="{file + _own(model, joint, attribute, 0.0)!r}"'
+    return found
 
 
 def _own(model: Model, site: str, parameter: str, absent: float) -> float:
@@ -58,14 +115,15 @@ def _own(model: Model, site: str, parameter: str, absent: float) -> float:
     return absent
 
 
-def _masses(link: Link) -> str:
-    fixed = "".join(f'<body name="{part.name}">{_inertial(part)}</body>' for part in link.parts[1:])
-    return _inertial(link.parts[0]) + fixed
+def _attribute(name: str, values: np.ndarray) -> str:
+    return f' {name}="{_text(values)}"' if values.any() else ""
 
 
-def _inertial(part: Part) -> str:
-    about = max(part.inertia, LEAST)
-    return (
-        f'<inertial pos="{part.across!r} 0 {part.up!r}" mass="{max(part.mass, LEAST)!r}" '
-        f'diaginertia="{about!r} {about!r} {about!r}"/>'
-    )
+def _axes(turn: np.ndarray) -> str:
+    if np.abs(turn - np.eye(3)).max() <= NEGLIGIBLE:
+        return ""
+    return f' xyaxes="{_text(turn[:, :2].T.ravel())}"'
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(repr(float(x)) for x in values)

@@ -99,6 +99,8 @@ class MujocoWorld:
         """See `World`."""
         self.model = self.mujoco.MjModel.from_xml_string(mjcf(model, self.step))
         self.durations, self.loaded = exchange.lanes.duration, exchange.lanes.loaded
+        order = [self.model.joint(name).dofadr[0] for name in model.plant.joints]
+        self.order, self.pairs = np.array(order), np.ix_(order, order)
         self.lanes = [_Lane.of(self.mujoco.MjData(self.model), exchange, lane) for lane in range(lanes)]
         self.mass = np.zeros((self.model.nv, self.model.nv))
         self.time_step = self.step
@@ -110,29 +112,29 @@ class MujocoWorld:
 
     def weigh(self) -> None:
         """See `World`."""
-        copy, step1, full_mass = np.copyto, self.mujoco.mj_step1, self.mujoco.mj_fullM
+        step1, full_mass, order = self.mujoco.mj_step1, self.mujoco.mj_fullM, self.order
         for lane, x in enumerate(self.lanes):
             if self.durations[lane] > 0.0:
                 if self.payload is not None:
                     # What MuJoCo derives from masses beforehand is for constraints, of which there are none.
                     self.model.body(EVENT).mass[0] = self.loaded[lane] * self.payload
-                copy(x.qpos, x.place)
-                copy(x.qvel, x.speed)
+                x.qpos[order] = x.place
+                x.qvel[order] = x.speed
                 step1(self.model, x.data)
                 full_mass(self.model, x.data, self.mass)
-                copy(x.mass, self.mass)
-                copy(x.held, x.bias)
+                x.mass[:] = self.mass[self.pairs]
+                x.held[:] = x.bias[order]
 
     def advance(self) -> None:
         """See `World`."""
-        copy, step2 = np.copyto, self.mujoco.mj_step2
+        step2, order = self.mujoco.mj_step2, self.order
         for lane, x in enumerate(self.lanes):
             duration = self.durations[lane]
             if duration > 0.0:
                 if duration != self.time_step:
                     self.time_step = duration
                     self.model.opt.timestep = duration
-                copy(x.applied, x.push)
+                x.applied[order] = x.push
                 step2(self.model, x.data)
-                copy(x.place, x.qpos)
-                copy(x.speed, x.qvel)
+                x.place[:] = x.qpos[order]
+                x.speed[:] = x.qvel[order]

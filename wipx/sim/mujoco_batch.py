@@ -22,7 +22,7 @@ from wipx.sim.stepped import single
 LONGER = 4.0  # steps of the loop in one
 EVEN = 1e-9  # relative spread of the steps of a window that counts as even
 BLOCK = 256  # rollouts held in memory at once
-RIGID = (R.ON_DOUBLE, R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
+RIGID = (R.ON_TREE, R.ON_DOUBLE, R.ON_TILT, R.ON_SMOOTHING)  # flags that add no physics to the rigid body
 
 
 def serves(batch: ModelBatch, inputs: Inputs, initial: np.ndarray, step: float) -> bool:

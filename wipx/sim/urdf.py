@@ -1,52 +1,77 @@
-"""A mechanism as URDF: a fixed rail or stand, the links, and payloads fixed to them."""
+"""A mechanism as URDF: a fixed ground, the links, and a payload that comes, fixed to its link."""
 
-from wipx.core.model import Model
-from wipx.sim.mechanism import EVENT, LEAST, Link, Part, mechanism
+from collections.abc import Mapping
+from xml.sax.saxutils import quoteattr
 
-RAIL = (
-    '<link name="rail"><inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
-    "</link>"
-)
+import numpy as np
+
+from wipx.core.tree import Link
+from wipx.sim.mechanism import EVENT, LEAST, ComingLoad, Mechanism
+from wipx.sim.tree.frames import BodyFrame, frame_on_axis, own_frame, placed, principal, roll_pitch_yaw
+
+GROUND = "ground"
+WITHOUT_MASS = '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial>'
 FREE = '<limit lower="-1e9" upper="1e9" effort="1e9" velocity="1e9"/>'
 
 
-def urdf(model: Model, *, with_event: bool = True) -> str:
-    """The rigid body of a model as URDF; inertia of the joints themselves (`Link.rotor`) has no place in it.
+def urdf(found: Mechanism, name: str, *, with_event: bool = True, joints: Mapping[str, str] | None = None) -> str:
+    """A mechanism as URDF; inertia of the joints themselves (armature) has no place in it.
+
+    A link's frame has the axes of its body's own frame, its origin on the joint's axis.
 
     Args:
-        model: Rigid body, geometry and environment.
-        with_event: Whether the payload of a payload event is on the body.
+        found: Links and a payload that comes.
+        name: Of the robot.
+        with_event: Whether the payload is on the body.
+        joints: Elements of the joints beside their places, by name; without limits if left out.
     """
-    links, below = RAIL, "rail"
-    for link in mechanism(model):
-        own = link.parts[0]
-        links += f'<link name="{own.name}">{_inertial(own)}</link>{_joint(link, below)}'
-        for part in link.parts[1:]:
-            if with_event or part.name != EVENT:
-                links += _fixed(part, own.name)
-        below = own.name
-    return f'<robot name="{model.plant.kind}">{links}</robot>'
+    tree = found.tree
+    frames = [frame_on_axis(link) for link in tree.links]
+    names = [link.body for link in tree.links]
+    ground = GROUND
+    while ground in names:
+        ground += "_"
+    text = f"<link name={quoteattr(ground)}>{WITHOUT_MASS}</link>"
+    for i, (link, frame) in enumerate(zip(tree.links, frames, strict=True)):
+        below = names[link.parent] if link.parent >= 0 else ground
+        com, inertia = frame.inside(link.com), frame.turn.T @ link.inertia @ frame.turn
+        turn, place = placed(tree, frames, i)
+        kind = "prismatic" if link.slides else "continuous"
+        own = FREE
+        if joints is not None:
+            own, kind = joints[link.joint], kind if link.slides or link.limits is None else "revolute"
+        text += (
+            f"<link name={quoteattr(link.body)}>{_inertial(link.mass, com, inertia)}</link>"
+            f'<joint name={quoteattr(link.joint)} type="{kind}">'
+            f"<parent link={quoteattr(below)}/><child link={quoteattr(link.body)}/>{_origin(turn, place)}"
+            f'<axis xyz="{_text(frame.axis)}"/>{own}</joint>'
+        )
+    if found.coming is not None and with_event:
+        text += _fixed(found.coming, tree.links[found.coming.link], frames[found.coming.link])
+    return f"<robot name={quoteattr(name)}>{text}</robot>"
 
 
-def _joint(link: Link, below: str) -> str:
-    axis = " ".join(repr(x) for x in link.axis)
+def _fixed(load: ComingLoad, carrier: Link, frame: BodyFrame) -> str:
+    own = own_frame(carrier)
+    place = frame.inside(own.turn @ load.place + own.origin)
     return (
-        f'<joint name="{link.joint}" type="{"prismatic" if link.slides else "continuous"}">'
-        f'<parent link="{below}"/><child link="{link.parts[0].name}"/>'
-        f'<origin xyz="0 0 {link.up!r}"/><axis xyz="{axis}"/>{FREE}</joint>'
+        f'<link name="{EVENT}">{_inertial(load.mass, place, np.zeros((3, 3)))}</link><joint name="{EVENT}" '
+        f'type="fixed"><parent link={quoteattr(carrier.body)}/><child link="{EVENT}"/></joint>'
     )
 
 
-def _fixed(part: Part, carrier: str) -> str:
+def _inertial(mass: float, com: np.ndarray, inertia: np.ndarray) -> str:
+    moments, axes = principal(inertia, LEAST)
+    xx, yy, zz = (repr(float(x)) for x in moments)
     return (
-        f'<link name="{part.name}">{_inertial(part)}</link>'
-        f'<joint name="{part.name}" type="fixed"><parent link="{carrier}"/><child link="{part.name}"/></joint>'
+        f'<inertial>{_origin(axes, com)}<mass value="{max(mass, LEAST)!r}"/>'
+        f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 
-def _inertial(part: Part) -> str:
-    about = max(part.inertia, LEAST)
-    return (
-        f'<inertial><origin xyz="{part.across!r} 0 {part.up!r}"/><mass value="{max(part.mass, LEAST)!r}"/>'
-        f'<inertia ixx="{about!r}" iyy="{about!r}" izz="{about!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
+def _origin(turn: np.ndarray, place: np.ndarray) -> str:
+    return f'<origin xyz="{_text(place)}" rpy="{_text(roll_pitch_yaw(turn))}"/>'
+
+
+def _text(values: np.ndarray) -> str:
+    return " ".join(repr(float(x)) for x in values)

@@ -15,6 +15,8 @@ def inertial_numbers(batch: ModelBatch, link: Link) -> np.ndarray:
     Numbers of the body's own frame and effects at the link (payload, com_offset, inertia) are part of them.
     """
     body = link.body
+    if not link.mass:  # between two joints of one body
+        return np.zeros((E.NUMBERS, batch.size))
     mass = batch.column(f"{body}.mass")
     com = np.stack([batch.column(f"{body}.com_{axis}") for axis in "xyz"])
     scale = batch.column(f"{body}.inertia")
@@ -41,6 +43,15 @@ def _numbers(mass: np.ndarray, com: np.ndarray, inertia: np.ndarray) -> np.ndarr
     about = inertia + mass * (np.sum(com**2, axis=0) * np.eye(3)[..., None] - com[:, None] * com[None])
     entries = [about[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
     return np.stack([mass, *(mass * com), *entries])
+
+
+def lumped(numbers: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre of mass (3,) and inertia about it (3, 3) from the ten numbers of a link (10,)."""
+    mass, first = float(numbers[0]), numbers[1:4]
+    com = first / mass if mass else np.zeros(3)
+    xx, yy, zz, xy, xz, yz = numbers[4:].tolist()
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return mass, com, about - mass * (com @ com * np.eye(3) - np.outer(com, com))
 
 
 def gravity(batch: ModelBatch, tree: Tree) -> np.ndarray:
