@@ -12,7 +12,7 @@ from diagnosis.recorded import recorded, write_folder
 from wipx.recordings.model_file import read_model
 
 AXIS, WIP = ("t", "x", "u"), ("t", "x", "theta", "u")
-RESULTS = {"config.yaml", "diagnosis.json", "diagnosis.png", "model.yaml", "report.html"}
+RESULTS = {"run.json", "config.yaml", "diagnosis.json", "diagnosis.png", "model.yaml", "report.html"}
 EFFECT = {"name", "parameters", "equivalent", "evidence", "present_probability"}
 CONTRACT = {  # keys of section 5
     "location": {"sites", "regions", "times"},

@@ -14,7 +14,8 @@ from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
 from wipx.tasks.files.adaptation import plain_adaptation, write_trajectories
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.files.results import written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.adapted import adaptation_problem, adapted_simulation, loaded_trials
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.trials import TrialPlan, trials_of
@@ -44,6 +45,7 @@ class Adapt:
     def run(self, job: Job) -> None:
         """Record or read the trials, adapt, write; nothing where it was done before."""
         if finished(job) is not None:
+            log_run(job)
             print(f"{job.out}: finished before, nothing to do")
             return
         source = trials_of(job, TrialPlan(self.per_load, self.duration, self.trial_seed))
@@ -52,7 +54,8 @@ class Adapt:
         result = _result(job, source, adapted, problem)
         with written_together(job.out) as folder:
             _write(job, folder, result, adapted.models[0])
-        _track(job, result)
+            _note(job, folder, result)
+        log_run(job)
         print(_summary(result))
 
 
@@ -96,7 +99,7 @@ def _summary(result: AdaptationResult) -> str:
     return "\n".join(lines)
 
 
-def _track(job: Job, result: AdaptationResult) -> None:
+def _note(job: Job, folder: Path, result: AdaptationResult) -> None:
     losses = {"fit": result.fit, "heldout": result.held_out}
     figures = {f"{part}/loss": loss.value for part, loss in losses.items() if loss is not None}
     figures |= {f"{part}/floor": loss.floor for part, loss in losses.items() if loss is not None}
@@ -105,12 +108,11 @@ def _track(job: Job, result: AdaptationResult) -> None:
     if history is not None:
         histories["search/best_loss"] = np.column_stack([history.evaluations, history.best_loss])
         figures |= {"search/evaluations": float(history.evaluations[-1]), "search/seconds": float(history.seconds[-1])}
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         f"{result.method} {result.optimizer} seed {result.seed}".replace("  ", " "),
-        flat(job.settings),
-        figures,
-        histories,
-        sorted(path for path in job.out.iterdir() if path.is_file() and not path.name.startswith(".")),
-        {"method": result.method, "optimizer": result.optimizer, "engine": result.engine, "target": result.target},
-        sweep=job.sweep,
+        metrics=figures,
+        histories=histories,
+        tags={"method": result.method, "optimizer": result.optimizer, "engine": result.engine, "target": result.target},
     )

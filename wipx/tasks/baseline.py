@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.windows import check_long_enough
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.files.results import flat, write_json, written_together
+from wipx.tasks.files.results import write_json, written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.job import Job
 
 NETWORK = "residual.npz"
@@ -49,7 +51,8 @@ class RunBaseline:
             write_model(answer.model, folder / "model.yaml")
             if answer.network is not None:
                 answer.network.write(folder / NETWORK)
-        _track(job, source.name, answer, errors, seconds)
+            _note(job, folder, source.name, answer, errors, seconds)
+        log_run(job)
         named = ", ".join(found.name for found in answer.found) or "nothing by name"
         print(f"{content['verdict']}: {named}; {seconds:.1f} s; written to {job.out}")
 
@@ -132,7 +135,7 @@ def _effect(found: Found, effect: Effect, plant: Plant, share: float) -> Mapping
     }
 
 
-def _track(job: Job, title: str, answer: Answer, errors: FitErrors, seconds: float) -> None:
+def _note(job: Job, folder: Path, title: str, answer: Answer, errors: FitErrors, seconds: float) -> None:
     figures = {
         f"fit/{model}/{column}": value
         for model in ("nominal", "completed", "noise_floor")
@@ -140,6 +143,5 @@ def _track(job: Job, title: str, answer: Answer, errors: FitErrors, seconds: flo
     }
     figures |= {f"parameter/{f.name}.{symbol}": v for f in answer.found for symbol, v in f.parameters.items()}
     figures["seconds"] = seconds
-    names = ["diagnosis.json", "model.yaml", *([NETWORK] if answer.network is not None else [])]
     tags = {"plant": answer.model.plant.kind, "verdict": "mismatch" if answer.mismatch else "consistent"}
-    job.part("tracking").log(title, flat(job.settings), figures, {}, [job.out / name for name in names], tags)
+    note_run(job, folder, title, metrics=figures, tags=tags)

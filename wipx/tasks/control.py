@@ -20,7 +20,8 @@ from wipx.report.numbers import significant
 from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.control import plain_control, write_courses
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.files.results import written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.control_metrics import TrialJudge
 from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioName
 from wipx.tasks.shared.job import Job
@@ -75,6 +76,7 @@ class Control:
     def run(self, job: Job) -> None:
         """Prepare model and controller, run all trials, judge, write; nothing where it was done before."""
         if finished(job) is not None:
+            log_run(job)
             print(f"{job.out}: finished before, nothing to do")
             return
         target = self._target(job)
@@ -89,7 +91,8 @@ class Control:
             trials = self._trials(target, self.loop(job, controller, robots, folder))
             result = self._result(job, robots, target, trials, estimates=controller.asks_estimator)
             _write(job, folder, result)
-        _track(job, result)
+            _note(job, folder, result)
+        log_run(job)
         print(_summary(result))
 
     def _target(self, job: Job) -> Target:
@@ -206,7 +209,7 @@ def _summary(result: ControlResult) -> str:
     return "\n".join(lines)
 
 
-def _track(job: Job, result: ControlResult) -> None:
+def _note(job: Job, folder: Path, result: ControlResult) -> None:
     trials = result.trials
     figures = {
         "failures": float(result.failures),
@@ -218,12 +221,10 @@ def _track(job: Job, result: ControlResult) -> None:
     errors = [trial.estimate - trial.pitch for trial in trials if trial.estimate is not None]
     if errors:
         figures["estimate/rmse"] = float(np.sqrt(np.mean(np.square(errors))))
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         f"{result.controller} {result.scenario} {result.method} seed {result.seed}",
-        flat(job.settings),
-        figures,
-        {},
-        sorted(path for path in job.out.iterdir() if path.is_file() and not path.name.startswith(".")),
-        {"controller": result.controller, "scenario": result.scenario, "method": result.method},
-        sweep=job.sweep,
+        metrics=figures,
+        tags={"controller": result.controller, "scenario": result.scenario, "method": result.method},
     )

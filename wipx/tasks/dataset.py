@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wipx.core.errors import InputError
+from wipx.core.locked import locked
 from wipx.core.model import Model, ModelBatch
 from wipx.identify.adaptation import AdaptationProblem, Adapted, LoadedTrials
 from wipx.identify.method import Method
@@ -22,8 +23,8 @@ from wipx.report.numbers import significant
 from wipx.sim.cache import simulator_digest
 from wipx.sim.simulator import StateFeedback
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.locked import locked
-from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.files.results import written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.adapted import adaptation_problem, adapted_simulation, loaded_trials
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.trials import TrialPlan, trials_of
@@ -95,6 +96,7 @@ class Dataset:
         """Make the training set or find it, draw it; nothing where it was done before."""
         before = finished(job)
         if before is not None and Path(before["path"]).is_file():
+            log_run(job)
             print(f"{job.out}: finished before, nothing to do")
             return
         started = time.perf_counter()
@@ -104,7 +106,8 @@ class Dataset:
         with written_together(job.out) as folder:
             _draw(training, folder)
             finish(job, folder, {"path": str(path), "seconds": seconds, "card": training.card})
-        _track(job, training)
+            _note(job, folder, training)
+        log_run(job)
         print(_summary(training, path, seconds))
 
 
@@ -232,16 +235,14 @@ def _summary(training: TrainingSet, path: Path, seconds: float) -> str:
     )
 
 
-def _track(job: Job, training: TrainingSet) -> None:
+def _note(job: Job, folder: Path, training: TrainingSet) -> None:
     card: Any = training.card
     figures = {f"label_check/{key}": float(value) for key, value in card["label_check"].items()}
     figures |= {"stopped": float(card["stopped"]), "gap/fit": float(card["gap"]["value"])}
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         f"training set {card['method']} seed {job.seed}",
-        flat(job.settings),
-        figures,
-        {},
-        sorted(path for path in job.out.iterdir() if path.is_file() and not path.name.startswith(".")),
-        {"method": str(card["method"]), "engine": str(card["engine"]), "training_set": str(card["name"])},
-        sweep=job.sweep,
+        metrics=figures,
+        tags={"method": str(card["method"]), "engine": str(card["engine"]), "training_set": str(card["name"])},
     )

@@ -14,7 +14,8 @@ from wipx.recordings.source import RecordingSource
 from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
 from wipx.sim.analytic import AnalyticSimulator
-from wipx.tasks.files.results import flat, write_csv, write_json, written_together
+from wipx.tasks.files.results import write_csv, write_json, written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 
@@ -67,7 +68,8 @@ class Diagnose:
             )
         with written_together(job.out) as folder:
             write_diagnosis(diagnosis, folder)
-        _track(job, diagnosis)
+            _note(job, folder, diagnosis)
+        log_run(job)
         print(summary(diagnosis))
         print(f"\npage: {job.out / 'report.html'}")
         return diagnosis
@@ -86,7 +88,7 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         write_csv(folder / "next_experiment.csv", diagnosis.next_experiment.reference)
 
 
-def _track(job: Job, diagnosis: Diagnosis) -> None:
+def _note(job: Job, folder: Path, diagnosis: Diagnosis) -> None:
     errors = {"fit": diagnosis.fit, "heldout": diagnosis.held_out}
     figures = {
         f"{part}/{model}/{column}": value
@@ -97,6 +99,5 @@ def _track(job: Job, diagnosis: Diagnosis) -> None:
     figures |= {f"parameter/{p.name}": p.value for effect in diagnosis.effects for p in effect.parameters}
     figures |= {f"evidence/{effect.name}": effect.log_evidence_gain for effect in diagnosis.effects}
     figures["seconds"] = diagnosis.seconds
-    names = ("diagnosis.json", "model.yaml", "report.html", "diagnosis.png")
     tags = {"plant": diagnosis.nominal.plant.kind, "source": diagnosis.source, "verdict": diagnosis.verdict}
-    job.part("tracking").log(diagnosis.title, flat(job.settings), figures, {}, [job.out / name for name in names], tags)
+    note_run(job, folder, diagnosis.title, metrics=figures, tags=tags)

@@ -19,7 +19,8 @@ from wipx.recordings.model_file import read_model, write_model
 from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
 from wipx.report.tables import summary
-from wipx.tasks.files.results import flat, write_csv, write_json, written_together
+from wipx.tasks.files.results import write_csv, write_json, written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import SearchProgress
 
@@ -64,7 +65,8 @@ class Identify:
         result = _result(source, split, request.nominal, found, objective)
         with written_together(job.out) as folder:
             _write(folder, result, found, request.nominal)
-        _track(job, result)
+            _note(job, folder, result)
+        log_run(job)
         print(summary(result))
         print(f"\npage: {job.out / 'report.html'}")
         return result
@@ -162,7 +164,7 @@ def _errors(errors: FitErrors) -> Mapping[str, object]:
     return {name: kept[name] for name in ("nominal", "completed", "noise_floor", "windows")}
 
 
-def _track(job: Job, result: IdentificationResult) -> None:
+def _note(job: Job, folder: Path, result: IdentificationResult) -> None:
     errors = {"fit": result.fit, "heldout": result.held_out}
     figures = {
         f"{part}/{model}/{column}": value
@@ -173,12 +175,11 @@ def _track(job: Job, result: IdentificationResult) -> None:
     }
     figures |= {f"parameter/{e.name}": e.value for e in result.estimates}
     history = result.history
-    names = ("model.yaml", "metrics.json", "report.html", "fit.png", "search.png", "search.csv")
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         result.title,
-        flat(job.settings),
-        figures,
-        {"search/best_loss": np.column_stack([history.evaluations, history.best_loss])},
-        [job.out / name for name in names],
-        {"plant": result.plant, "source": result.source},
+        metrics=figures,
+        histories={"search/best_loss": np.column_stack([history.evaluations, history.best_loss])},
+        tags={"plant": result.plant, "source": result.source},
     )

@@ -20,7 +20,8 @@ from wipx.report.numbers import significant
 from wipx.tasks.control import Control
 from wipx.tasks.dataset import Dataset, training_set_of
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.files.results import written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 
@@ -47,6 +48,7 @@ class ControllerMargins:
     def run(self, job: Job) -> None:
         """Compute margins, release the robot under all loads, write; nothing where it was done before."""
         if finished(job) is not None:
+            log_run(job)
             print(f"{job.out}: finished before, nothing to do")
             return
         settings: Dataset = job.build(self.dataset, "task.dataset")
@@ -74,7 +76,8 @@ class ControllerMargins:
                 )
             write_model(robots.model, folder / "model.yaml")
             _write(job, folder, found, region)
-        _track(job, found, region)
+            _note(job, folder, found, region)
+        log_run(job)
         print(f"{_summary(found, region)}: {job.out / 'table.md'}")
 
 
@@ -136,18 +139,16 @@ def _summary(found: Mapping[str, Margins], region: RecoveryRegion) -> str:
     )
 
 
-def _track(job: Job, found: Mapping[str, Margins], region: RecoveryRegion) -> None:
+def _note(job: Job, folder: Path, found: Mapping[str, Margins], region: RecoveryRegion) -> None:
     figures = {}
     for name, one in found.items():
         figures |= {f"{name}/{key}": float(value) for key, value in asdict(one).items() if np.isfinite(value)}
         figures[f"{name}/recovered"] = region.controllers[name].share
     method = str(job.chosen.get("method"))
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         f"margins {method} seed {job.seed}",
-        flat(job.settings),
-        figures,
-        {},
-        sorted(path for path in job.out.iterdir() if path.is_file() and not path.name.startswith(".")),
-        {"method": method, "target": str(job.chosen.get("target"))},
-        sweep=job.sweep,
+        metrics=figures,
+        tags={"method": method, "target": str(job.chosen.get("target"))},
     )

@@ -16,7 +16,8 @@ from wipx.report.numbers import significant
 from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.estimation import plain_estimation
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.results import flat, written_together
+from wipx.tasks.files.results import written_together
+from wipx.tasks.files.tracked import log_run, note_run
 from wipx.tasks.shared.adapted import loaded_trials
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
@@ -42,6 +43,7 @@ class Train:
     def run(self, job: Job) -> None:
         """Make or read the training set, train, judge, write; nothing where it was done before."""
         if finished(job) is not None:
+            log_run(job)
             print(f"{job.out}: finished before, nothing to do")
             return
         settings: Dataset = job.build(self.dataset, "task.dataset")
@@ -56,7 +58,8 @@ class Train:
             result = self._result(job, robots, trials, folder)
             _draw(result, folder)
             finish(job, folder, plain_estimation(result))
-        _track(job, result)
+            _note(job, folder, result)
+        log_run(job)
         print(_summary(result))
 
     def _result(self, job: Job, robots: SimulatedRobots, trials: LoadedTrials, folder: Path) -> EstimationResult:
@@ -119,16 +122,14 @@ def _summary(result: EstimationResult) -> str:
     return "\n".join([*lines, f"  one estimate takes {significant(1e3 * result.latency)} ms"])
 
 
-def _track(job: Job, result: EstimationResult) -> None:
+def _note(job: Job, folder: Path, result: EstimationResult) -> None:
     figures = {"latency_s": result.latency, "seconds": result.seconds}
     for name, judged in (("sim", result.simulated), ("real", result.recorded)):
         figures |= {f"{name}/rmse": judged.rmse, f"{name}/mse": judged.mse, f"{name}/coverage": judged.coverage}
-    job.part("tracking").log(
+    note_run(
+        job,
+        folder,
         f"{result.method} {result.estimator} {result.length} seed {result.seed}",
-        flat(job.settings),
-        figures,
-        {},
-        sorted(path for path in job.out.iterdir() if path.is_file() and not path.name.startswith(".")),
-        {"method": result.method, "estimator": result.estimator, "target": result.target},
-        sweep=job.sweep,
+        metrics=figures,
+        tags={"method": result.method, "estimator": result.estimator, "target": result.target},
     )

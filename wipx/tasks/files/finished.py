@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from wipx.core.errors import InputError
-from wipx.tasks.files.results import flat, write_json
+from wipx.tasks.files.results import RESULT, flat, write_json
 from wipx.tasks.shared.job import Job
 
-RESULT = "result.json"
 SETTINGS = "config.yaml"  # stands beside the results of every task that has succeeded
 ERROR = "error.txt"
 WITHOUT_EFFECT = ("name", "label", "tracking")  # settings that change no result

@@ -11,6 +11,8 @@ import numpy as np
 
 from wipx.core.errors import InputError
 
+RESULT = "result.json"  # what a job found, with its settings
+UNFINISHED = ".unfinished-"
 BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->"
 
 
@@ -32,17 +34,19 @@ def replace_table(page: Path, table: str) -> None:
 def written_together(out: Path) -> Iterator[Path]:
     """A folder to write results to; they appear in `out` when the block ends without an error.
 
+    `RESULT`, by which a job counts as finished, appears after all others.
+
     Raises:
         InputError: `out` cannot be written.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=out))
+        folder = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=out))
     except OSError as error:
         raise InputError(f"{out}: cannot write results here ({error.strerror}); set hydra.run.dir=FOLDER") from error
     try:
         yield folder
-        for path in sorted(folder.iterdir()):
+        for path in sorted(folder.iterdir(), key=lambda path: (path.name == RESULT, path.name)):
             target = out / path.name
             if target.is_dir():
                 shutil.rmtree(target)

@@ -1,5 +1,6 @@
 """What a task is given: the settings of one run, and the swappable parts it may ask for."""
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,6 +26,7 @@ class Job:
         chosen: Option that was chosen of each group, by group; empty where a run was put together otherwise.
         sweep: Folder of the sweep that the run is a job of; None for a single run.
         overrides: What the command line asked for, each as KEY=VALUE.
+        started: Time at which the run began [s since the epoch].
     """
 
     out: Path
@@ -39,3 +41,4 @@ class Job:
     chosen: Mapping[str, str] = field(default_factory=dict)
     sweep: Path | None = None
     overrides: tuple[str, ...] = ()
+    started: float = field(default_factory=time.time)

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from wipx.control.controller import Controller
 from wipx.core.errors import InputError, check_positive
 from wipx.core.load import Load
+from wipx.core.locked import locked
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.hardware.target import Target, Trial
@@ -22,7 +23,6 @@ from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.cache import simulator_digest
 from wipx.sim.simulator import StateFeedback
-from wipx.tasks.files.locked import locked
 from wipx.tasks.files.results import write_csv
 from wipx.tasks.shared.job import Job
 
