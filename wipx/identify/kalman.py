@@ -6,6 +6,7 @@ linearised along the recording; they say what innovations of a row, and of those
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -46,30 +47,45 @@ class Gains(NamedTuple):
 
 @dataclass(frozen=True)
 class Filter:
-    """The filter of a model, and what it makes of the rows after a place.
+    """The filter of a model, and the places where it smooths.
 
     Attributes:
         along: Its gains.
         scale: What the model's sensors show of one unit, shape (joints,).
+        late: Delay of each sensor, shape (joints,) [s].
         places: Where it smooths.
-        ahead: Gains from innovations of the next M rows to coordinates and rates at each place, shape (W, M, 2 joints,
-            joints); zero for rows that do not count.
+        until: Last row that the state at each place may be estimated from, shape (W,).
     """
 
     along: Gains
     scale: np.ndarray
+    late: np.ndarray
     places: Places
-    ahead: np.ndarray
+    until: np.ndarray
+
+    @cached_property
+    def _seen(self) -> np.ndarray:
+        """What the sensors show at every row of the state after the row before, shape (K + 1, R, joints, n)."""
+        joints = len(self.late)
+        return self.along.moves[:, :, :joints] - self.late[:, None] * self.along.moves[:, :, joints : 2 * joints]
+
+    @cached_property
+    def _closed(self) -> np.ndarray:
+        """What becomes of an error of the state from one row to the next, shape (K + 1, R, n, n)."""
+        return self.along.moves - self.along.gains @ self._seen
 
     def smoothed(self, prior: np.ndarray, surprises: np.ndarray) -> np.ndarray:
         """States of P models at the places, shape (W, 2 joints, P).
+
+        The rows after a place are gone through backwards (Bryson, Frazier 1963).
 
         Args:
             prior: States at every row before they are corrected there, shape (K + 1, R, 2 joints, P).
             surprises: Innovations there, shape (K + 1, R, joints, P).
         """
-        found = np.empty((len(self.places.rows), *prior.shape[2:]))
-        _smooth(self.along.gains, self.ahead, *self.places, prior, surprises, found)
+        told = np.swapaxes(self._seen, 2, 3) @ (self.along.innovation @ surprises)
+        found = np.empty((len(self.until), *prior.shape[2:]))
+        _smooth(self.along, self._closed, told, *self.places, self.until, prior, surprises, found)
         return found
 
     def spread(self) -> np.ndarray:
@@ -78,12 +94,17 @@ class Filter:
         Innovations are white, so each later one takes its own share off.
         """
         rows, recordings = self.places
-        count, size = self.ahead.shape[1:3]
-        later = np.minimum(rows[:, None] + 1 + np.arange(count), len(self.along.gains) - 1)
-        known = np.any(self.ahead != 0.0, axis=(2, 3))
-        inverse = np.where(known[..., None, None], self.along.innovation[later, recordings[:, None]], np.eye(size // 2))
-        taken = np.einsum("wmij,wmjk,wmlk->wil", self.ahead, np.linalg.inv(inverse), self.ahead)
-        return self.along.covariance[rows, recordings, :size, :size] - taken
+        size = 2 * len(self.late)
+        found = self.along.covariance[rows, recordings][:, :size]
+        error, found = found, found[:, :, :size].copy()
+        for ahead in range(1, 1 + int(np.max(self.until - rows, initial=0))):
+            inside = rows + ahead <= self.until
+            later = np.minimum(rows + ahead, self.until), recordings
+            seen = error @ np.swapaxes(self._seen[later], 1, 2)
+            taken = seen @ self.along.innovation[later] @ np.swapaxes(seen, 1, 2)
+            found -= taken * inside[:, None, None]
+            error = error @ np.swapaxes(self._closed[later], 1, 2)
+        return found
 
 
 def gains_along(
@@ -106,14 +127,6 @@ def gains_along(
     innovation = np.zeros((*t.shape, len(late), len(late)))
     _filter(moves, t, last, sensor**2, rate, late, gains, covariance, innovation)
     return Gains(moves, gains, covariance, innovation)
-
-
-def look_ahead(along: Gains, late: np.ndarray, places: Places, until: np.ndarray) -> np.ndarray:
-    """`Filter.ahead` of rows up to `until` (W,), for sensors with delays (joints,) [s]."""
-    joints = len(late)
-    found = np.zeros((len(until), int(np.max(until - places.rows, initial=0)), 2 * joints, joints))
-    _look_ahead(along.moves, along.covariance, along.gains, along.innovation, late, *places, until, found)
-    return found
 
 
 @cached
@@ -182,50 +195,40 @@ def _filter(moves, t, last, sensor, rate, late, gains, covariance, innovation):
 
 
 @cached
-def _carried(back, move, gain, late, moved, seen):
-    """Take a row of gains (n,) from the correction at a row to that at the next; `seen` of it by the sensors there."""
-    joints = len(late)
-    for p in range(len(back)):
-        moved[p] = 0.0
-        for m in range(len(back)):
-            moved[p] += move[p, m] * back[m]
-    for j in range(joints):
-        seen[j] = moved[j] - late[j] * moved[joints + j]
-    for p in range(len(back)):
-        back[p] = moved[p]
-        for j in range(joints):
-            back[p] -= gain[p, j] * seen[j]
+def _smooth(along, closed, told, rows, recordings, until, prior, surprises, found):
+    """States at some rows from those before their correction, the innovations there, and those of later rows.
 
-
-@cached
-def _look_ahead(moves, covariance, gains, innovation, late, rows, recordings, until, found):
-    """Gains from the innovations of later rows, until some row, to the states at some rows."""
-    joints, n = len(late), covariance.shape[3]
-    back, moved, seen = np.zeros(n), np.zeros(n), np.zeros(joints)
-    for w in range(len(rows)):
-        r = recordings[w]
-        for q in range(2 * joints):
-            back[:] = covariance[rows[w], r, q]
-            for i in range(rows[w] + 1, until[w] + 1):
-                _carried(back, moves[i, r], gains[i, r], late, moved, seen)
-                for m in range(joints):
-                    for j in range(joints):
-                        found[w, i - rows[w] - 1, q, m] += seen[j] * innovation[i, r, j, m]
-
-
-@cached
-def _smooth(gains, ahead, rows, recordings, prior, surprises, found):
-    """States at some rows from those before their correction, and the innovations there and later."""
-    joints, models = surprises.shape[2:]
+    What an innovation tells of the state after the row before, `told` (K + 1, R, n, P), is carried backwards.
+    """
+    n, models = told.shape[2:]
+    carried = np.zeros((2, n, models))
     for w in range(len(rows)):
         k, r = rows[w], recordings[w]
-        until = min(ahead.shape[1], len(prior) - 1 - k)
-        for i in range(2 * joints):
+        now = carried[0]
+        now[:] = 0.0
+        for i in range(until[w], k, -1):
+            now, after = carried[(until[w] - i + 1) % 2], carried[(until[w] - i) % 2]
+            now[:] = told[i, r]
+            _add_product(closed[i, r], after, now)
+        found[w] = prior[k, r]
+        _add_product(along.gains[k, r].T, surprises[k, r], found[w])
+        _add_product(along.covariance[k, r], now, found[w])
+
+
+@cached
+def _add_product(columns, of, to):
+    """Add the product of a matrix, given by its columns, with some columns to `to`, as many rows as that has."""
+    rows, models = to.shape
+    if models == 1:  # the longer loop is the inner one
+        only = to.ravel()
+        for c in range(len(of)):
+            column, factor = columns[c], of[c, 0]
+            for i in range(rows):
+                only[i] += factor * column[i]
+        return
+    for i in range(rows):
+        row = to[i]
+        for c in range(len(of)):
+            factor, other = columns[c, i], of[c]
             for p in range(models):
-                found[w, i, p] = prior[k, r, i, p]
-            for j in range(joints):
-                for p in range(models):
-                    found[w, i, p] += gains[k, r, i, j] * surprises[k, r, j, p]
-                for m in range(until):
-                    for p in range(models):
-                        found[w, i, p] += ahead[w, m, i, j] * surprises[k + 1 + m, r, j, p]
+                row[p] += factor * other[p]

@@ -18,7 +18,7 @@ import numpy as np
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along, look_ahead
+from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import linearise_along
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
@@ -125,7 +125,7 @@ class Smoother:
         sensor = self.noise / np.abs(scale)
         rate = (np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval
         along = gains_along(linearise_along(model, self._measured), inputs.t, inputs.last, sensor, rate, late)
-        return Filter(along, scale, places, look_ahead(along, late, places, self._last_seen(places)))
+        return Filter(along, scale, late, places, self._last_seen(places))
 
     def _last_seen(self, places: Places) -> np.ndarray:
         """Last row that the state at each place may be estimated from, shape (W,)."""

@@ -19,7 +19,8 @@ class Starts:
     Attributes:
         windows: R of them.
         until: Row of each window at which its prediction starts, shape (R,).
-        states: As the sensors of each of B models show them, without their delay, shape (rows, 2 joints, B, R).
+        states: As the sensors of each of B models show them, without their delay, shape (rows, 2 joints, B, R). Rows
+            before the first that is simulated have the state of that.
     """
 
     windows: Windows
@@ -46,15 +47,18 @@ def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Se
 
 def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
     """Starts by each of B models, with a filter for each or one for all; these smooth at `leads_of` the windows."""
-    until = _until(windows)
-    found = smoother.following(batch, filters).reshape(batch.size, until.max() + 1, windows.count, -1)
-    return Starts(windows, until, np.ascontiguousarray(found.transpose(1, 3, 0, 2)))
+    until, first = _until(windows), windows.inputs.first
+    found = smoother.following(batch, filters)
+    found = found.reshape(batch.size, -1, windows.count, found.shape[2])
+    place = np.clip(np.arange(until.max() + 1)[:, None] - first, 0, until - first)
+    states = found[:, place, np.arange(windows.count)]  # (B, rows, R, 2 joints)
+    return Starts(windows, until, np.ascontiguousarray(states.transpose(1, 3, 0, 2)))
 
 
 def leads_of(windows: Windows) -> Places:
-    """The rows that lead up to the start of each window: the first ones of all windows, then the second ones."""
-    until = _until(windows)
-    rows = np.minimum(np.arange(until.max() + 1)[:, None], until) + windows.row
+    """The rows from the first that is simulated to the start of each window: first ones of all windows, then second."""
+    until, first = _until(windows), windows.inputs.first
+    rows = np.minimum(np.arange(np.max(until - first) + 1)[:, None], until - first) + first + windows.row
     return Places(rows.ravel(), np.broadcast_to(windows.recording, rows.shape).ravel())
 
 
