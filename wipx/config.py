@@ -44,6 +44,8 @@ class RunConfig:
             prior, or None.
         bounds: Search intervals [low, high] that replace the usual ones, by parameter [SI].
         model: The model to start from.
+        format: Of the file that task=export writes, "mjcf" or "urdf".
+        strict: Whether task=export refuses a model with an effect that the format cannot say.
         task: What is done; like all the groups below a node with a `_target_`.
         diagnosis: The rules of a diagnosis.
         recordings: Where recordings come from.
@@ -67,6 +69,8 @@ class RunConfig:
     free: dict[str, Any] = field(default_factory=dict)
     bounds: dict[str, Any] = field(default_factory=dict)
     model: ModelConfig = field(default_factory=ModelConfig)
+    format: str = "mjcf"
+    strict: bool = False
     task: Any = None
     diagnosis: Any = None
     recordings: Any = None

@@ -4,7 +4,9 @@ A link's frame has its origin on the joint's axis and z along it; at position ze
 parent's frame as `rotation` and `place` say. The ground is number -1.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -50,6 +52,19 @@ class Link:
     effort: float | None = None
 
 
+@dataclass(frozen=True)
+class ModelFile:
+    """The MJCF or URDF file that a tree was read from.
+
+    Attributes:
+        path: Absolute.
+        locked: Joints that were fixed, with their positions [rad or m].
+    """
+
+    path: Path
+    locked: Mapping[str, float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, eq=False)
 class Tree:
     """An open kinematic tree on a fixed base.
@@ -57,10 +72,12 @@ class Tree:
     Attributes:
         links: Parents before children; link i is carried by joint i.
         gravity: In the ground's frame, shape (3,) [m/s^2].
+        source: The file that it was read from, which need not be there any more; None for a tree from elsewhere.
     """
 
     links: tuple[Link, ...]
     gravity: np.ndarray
+    source: ModelFile | None = None
 
     @property
     def joints(self) -> tuple[str, ...]:

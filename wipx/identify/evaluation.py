@@ -49,6 +49,10 @@ class Judge:
         starts = self._starts(model, recordings)
         return _by_recording(starts.windows, self._predicted(model, starts), recordings)
 
+    def from_same_states(self, model: Model, recordings: tuple[Recording, ...]) -> "FromSameStates":
+        """Predictions by other simulators, each from the states that this model smooths."""
+        return FromSameStates(self, model, self._starts(model, recordings), recordings)
+
     def compare(
         self, nominal: Model, completed: Model, recordings: tuple[Recording, ...], *, held_out: bool
     ) -> tuple[FitErrors, tuple[Trace, ...]]:
@@ -128,9 +132,12 @@ class Judge:
 
     def _predicted(self, model: Model, starts: Starts) -> np.ndarray:
         """Predicted coordinates, shape (K + 1, joints, R); what fell over is held within bounds."""
-        shown = self._replayed(model, starts, 1)[:, :, 0]
-        recorded = starts.windows.recorded
-        rows = np.moveaxis(recorded, 1, 0)[:, starts.windows.predicted]
+        return self.bounded(self._replayed(model, starts, 1)[:, :, 0], starts.windows)
+
+    def bounded(self, shown: np.ndarray, windows: Windows) -> np.ndarray:
+        """Coordinates (K + 1, joints, R) no further from the recorded ones than a prediction that fell over counts."""
+        recorded = windows.recorded
+        rows = np.moveaxis(recorded, 1, 0)[:, windows.predicted]
         largest = (DIVERGED * np.ptp(rows, axis=1) + 1e3 * self.noise)[:, None]
         return recorded + np.clip(np.nan_to_num(shown - recorded, nan=np.inf), -largest, largest)
 
@@ -182,6 +189,43 @@ class Judge:
             {name: completed[:, j] for j, name in enumerate(names)},
             windows.starts[windows.recording == index],
         )
+
+
+@dataclass(frozen=True)
+class FromSameStates:
+    """Windows of recordings that several simulators predict from one state each.
+
+    Attributes:
+        judge: Says what a window is.
+        model: That smoothed the states.
+        starts: Of all windows.
+        recordings: What is predicted.
+    """
+
+    judge: Judge
+    model: Model
+    starts: Starts
+    recordings: tuple[Recording, ...]
+
+    def predicted(self, model: Model, simulator: Simulator) -> np.ndarray:
+        """Coordinates that a model shows in a simulator, shape (K + 1, joints, R); what fell over is held in bounds."""
+        path = self.starts.path(ModelBatch(self.model, (), np.zeros((1, 0))))
+        shown = simulator.replay(ModelBatch(model), self.starts.windows.inputs, path.states[0], path).coordinates
+        return self.judge.bounded(shown[:, :, 0], self.starts.windows)
+
+    def errors(self, predicted: np.ndarray) -> dict[str, float]:
+        """Root mean square errors by coordinate."""
+        windows = self.starts.windows
+        return dict(zip(self.model.plant.coordinates, _rms(windows, predicted - windows.recorded), strict=True))
+
+    def floor(self) -> dict[str, float]:
+        """Errors that a right model would have from the noise of the sensors alone."""
+        deviations = self.judge._floor(self.model, self.starts, self.recordings)
+        return dict(zip(self.model.plant.coordinates, _typical(self.starts.windows, deviations), strict=True))
+
+    def by_recording(self, predicted: np.ndarray) -> list[np.ndarray]:
+        """Predicted coordinates of each recording, shape (rows, joints); NaN before the first window."""
+        return _by_recording(self.starts.windows, predicted, self.recordings)
 
 
 def _rms(windows: Windows, errors: np.ndarray) -> list[float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wipx.core.drive import Drive
 from wipx.core.errors import InputError
-from wipx.core.tree import Link, Tree
+from wipx.core.tree import Link, ModelFile, Tree
 
 
 def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
@@ -188,7 +188,8 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
                 effort=effort,
             )
         )
-    tree = Tree(tuple(links), np.array(model.opt.gravity, dtype=float))
+    source = ModelFile(path.resolve(), locked)
+    tree = Tree(tuple(links), np.array(model.opt.gravity, dtype=float), source)
     _check_masses(tree, path)
     return tree
 

@@ -9,7 +9,7 @@ import numpy as np
 from wipx.core.drive import Drive, Logged
 from wipx.core.errors import InputError, unknown_name
 from wipx.core.plant import Plant, robot_plant
-from wipx.core.tree import Link, Tree
+from wipx.core.tree import Link, ModelFile, Tree
 from wipx.recordings.robot_model import read_drives, read_tree
 from wipx.recordings.strict_yaml import finite_number
 
@@ -25,7 +25,7 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
     """The plant of a robot.yaml or model.yaml with `plant: robot`.
 
     Args:
-        data: Content of the file: `model`, `locked`, `drives`; or `tree`, `drives`.
+        data: Content of the file: `model`, `locked`, `drives`, and `tree`, which is taken where it is there.
         where: File, for messages.
         folder: That the path `model` is relative to.
 
@@ -34,7 +34,7 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
     """
     own: dict[str, Drive] = {}
     if data.get("tree") is not None:
-        tree = _tree(cast(Mapping[str, Any], data["tree"]))
+        tree = _tree(cast(Mapping[str, Any], data["tree"]), _source(data, where, folder))
     else:
         model = data.get("model")
         if not isinstance(model, str) or not model:
@@ -52,7 +52,7 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
 
 
 def plant_to_mapping(plant: Plant) -> dict[str, object]:
-    """Tree and drives of a robot as a model.yaml holds them."""
+    """Tree and drives of a robot as a model.yaml holds them, and the file that they were read from."""
     assert plant.tree is not None
     links = []
     for link in plant.tree.links:
@@ -64,16 +64,24 @@ def plant_to_mapping(plant: Plant) -> dict[str, object]:
         joint: {key: getattr(drive, key) for key in DRIVE_KEYS[drive.kind] if getattr(drive, key) is not None}
         for joint, drive in plant.drives.items()
     }
-    return {"tree": {"gravity": plant.tree.gravity.tolist(), "links": links}, "drives": drives}
+    source = plant.tree.source
+    file = {} if source is None else {"model": str(source.path), "locked": dict(source.locked)}
+    return {**file, "tree": {"gravity": plant.tree.gravity.tolist(), "links": links}, "drives": drives}
 
 
-def _tree(data: Mapping[str, Any]) -> Tree:
+def _source(data: Mapping[str, object], where: str, folder: Path) -> ModelFile | None:
+    """The file that the tree of a model.yaml was read from."""
+    model = data.get("model")
+    return ModelFile(folder / model, _locked(data.get("locked"), where)) if isinstance(model, str) else None
+
+
+def _tree(data: Mapping[str, Any], source: ModelFile | None) -> Tree:
     links = []
     for each in data["links"]:
         known = {name: np.array(value, dtype=float) if name in ARRAYS else value for name, value in each.items()}
         limits = known.get("limits")
         links.append(Link(**{**known, "limits": None if limits is None else (float(limits[0]), float(limits[1]))}))
-    return Tree(tuple(links), np.array(data["gravity"], dtype=float))
+    return Tree(tuple(links), np.array(data["gravity"], dtype=float), source)
 
 
 def _locked(data: object, where: str) -> dict[str, float]:

@@ -75,6 +75,7 @@ def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, count
         for w in range(n):
             place, speed = J[R.MID * W + w], J[R.RATE * W + w]
             X.place[j, w], X.speed[j, w] = place, speed
+            X.command[j, w] = J[R.COMMAND * W + w]
             if not (abs(place) < LOST and abs(speed) < LOST):
                 X.duration[w] = 0.0
     if on[R.ON_EVENT]:

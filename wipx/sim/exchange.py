@@ -21,6 +21,7 @@ class Lanes(NamedTuple):
         push: Generalised forces that bring it there, shape (N, W).
         duration: Of the step; 0 where a lane pauses, shape (W,).
         loaded: Share of the payload event's mass that is on the body, shape (W,).
+        command: Of each drive at this moment, times its input gain, shape (N, W).
     """
 
     place: np.ndarray
@@ -32,6 +33,7 @@ class Lanes(NamedTuple):
     push: np.ndarray
     duration: np.ndarray
     loaded: np.ndarray
+    command: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,9 @@ class Exchange:
     @classmethod
     def of(cls, joints: slice, width: int) -> "Exchange":
         """An exchange for a plant whose `joints` are some of `width`."""
-        place, speed, bias, rotor, gained, push = (np.zeros((width, W)) for _ in range(6))
+        place, speed, bias, rotor, gained, push, command = (np.zeros((width, W)) for _ in range(7))
         mass = np.repeat(np.eye(width)[..., None], W, axis=2)  # 1 for a joint that the plant lacks
-        return cls(joints, Lanes(place, speed, mass, bias, rotor, gained, push, np.zeros(W), np.zeros(W)))
+        return cls(joints, Lanes(place, speed, mass, bias, rotor, gained, push, np.zeros(W), np.zeros(W), command))
 
     def joint(self, name: str, lane: int) -> np.ndarray:
         """What `lane` has of a quantity of the joints, a view of shape (joints,)."""

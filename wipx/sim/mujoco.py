@@ -97,14 +97,19 @@ class MujocoWorld:
 
     def load(self, model: Model, exchange: Exchange, lanes: int) -> None:
         """See `World`."""
-        self.model = self.mujoco.MjModel.from_xml_string(mjcf(model, self.step))
+        self.model = self.compiled(model)
         self.durations, self.loaded = exchange.lanes.duration, exchange.lanes.loaded
-        order = [self.model.joint(name).dofadr[0] for name in model.plant.joints]
+        order = [int(self.model.joint(name).dofadr[0]) for name in model.plant.joints]
         self.order, self.pairs = np.array(order), np.ix_(order, order)
+        self.places = np.array([int(self.model.joint(name).qposadr[0]) for name in model.plant.joints])
         self.lanes = [_Lane.of(self.mujoco.MjData(self.model), exchange, lane) for lane in range(lanes)]
         self.mass = np.zeros((self.model.nv, self.model.nv))
         self.time_step = self.step
         self.payload = model.effects[f"geometry/{EVENT}"]["mass"] if f"geometry/{EVENT}" in model.effects else None
+
+    def compiled(self, model: Model) -> Any:
+        """MuJoCo's model of the rigid body."""
+        return self.mujoco.MjModel.from_xml_string(mjcf(model, self.step))
 
     def close(self) -> None:
         """See `World`."""
@@ -118,7 +123,7 @@ class MujocoWorld:
                 if self.payload is not None:
                     # What MuJoCo derives from masses beforehand is for constraints, of which there are none.
                     self.model.body(EVENT).mass[0] = self.loaded[lane] * self.payload
-                x.qpos[order] = x.place
+                x.qpos[self.places] = x.place
                 x.qvel[order] = x.speed
                 step1(self.model, x.data)
                 full_mass(self.model, x.data, self.mass)
@@ -136,5 +141,5 @@ class MujocoWorld:
                     self.model.opt.timestep = duration
                 x.applied[order] = x.push
                 step2(self.model, x.data)
-                x.place[:] = x.qpos[order]
+                x.place[:] = x.qpos[self.places]
                 x.speed[:] = x.qvel[order]

@@ -45,6 +45,11 @@ def _numbers(mass: np.ndarray, com: np.ndarray, inertia: np.ndarray) -> np.ndarr
     return np.stack([mass, *(mass * com), *entries])
 
 
+def numbers_of(mass: float, com: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """The ten numbers (10,) of a mass, its centre (3,) and the inertia about it (3, 3)."""
+    return _numbers(np.array([mass]), com[:, None], inertia[..., None])[:, 0]
+
+
 def lumped(numbers: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Mass, centre of mass (3,) and inertia about it (3, 3) from the ten numbers of a link (10,)."""
     mass, first = float(numbers[0]), numbers[1:4]
