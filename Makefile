@@ -102,7 +102,7 @@ bench: $(READY)  ## measure speed and memory
 
 # Pins for every Python from 3.11 on and every platform; kept where they still fit, `UPGRADE=--upgrade` renews them.
 lock: $(READY)  ## renew requirements.lock after a change of pyproject.toml
-	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra baselines --extra docs --extra slurm $(UPGRADE) \
+	$(PY) -m uv pip compile --quiet --universal --python-version 3.11 --extra dev --extra mujoco --extra baselines --extra docs --extra import --extra slurm $(UPGRADE) \
 		--no-emit-index-url --no-emit-find-links --no-annotate --no-header --output-file requirements.lock pyproject.toml
 
 clean:  ## remove runs/, caches and .venv

@@ -13,7 +13,7 @@ LAYERS = (
     {"sim"},
     {"control", "identify", "recordings", "report", "tracking"},
     {"export", "hardware", "learn"},
-    {"baselines", "diagnosis"},
+    {"baselines", "diagnosis", "importing"},
     {"library"},
     {"tasks"},
     {"proof"},
@@ -46,8 +46,8 @@ ALLOWED_IN = {
     "pysindy": {"baselines"},
     "cma": {"identify", "baselines"},
     "pymoo": {"identify"},
-    "can": {"hardware"},
-    "cantools": {"hardware"},
+    "can": {"hardware", "importing"},
+    "cantools": {"hardware", "importing"},
     "serial": {"hardware"},
 }
 FILES = sorted(path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.name != "__init__.py")

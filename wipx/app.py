@@ -28,6 +28,7 @@ from wipx.tasks.files.finished import ERROR, SETTINGS
 from wipx.tasks.shared.job import Job
 
 ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
+FLAGS = ("-m", "--multirun", "--config-dir=")
 DONE, DEFECT, INPUT_AT_FAULT, INTERRUPTED = 0, 1, 2, 130
 
 
@@ -51,8 +52,8 @@ def main() -> int:
         fault; 130 interrupted.
     """
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
-    # Hydra does not read overrides on both sides of the flag for a sweep.
-    sys.argv[1:] = sorted(renamed(sys.argv[1:]), key=lambda argument: argument in ("-m", "--multirun"))
+    # Hydra does not read overrides on both sides of a flag.
+    sys.argv[1:] = sorted(renamed(sys.argv[1:]), key=lambda argument: argument.startswith(FLAGS))
     register()
     started = time.time()
 

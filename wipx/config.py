@@ -46,6 +46,8 @@ class RunConfig:
         model: The model to start from.
         format: Of the file that task=export writes, "mjcf" or "urdf".
         strict: Whether task=export refuses a model with an effect that the format cannot say.
+        write: Whether task=import writes recordings; it shows only what they would be unless asked.
+        log: What task=import reads, chosen by import=OPTION.
         task: What is done; like all the groups below a node with a `_target_`.
         diagnosis: The rules of a diagnosis.
         recordings: Where recordings come from.
@@ -71,6 +73,8 @@ class RunConfig:
     model: ModelConfig = field(default_factory=ModelConfig)
     format: str = "mjcf"
     strict: bool = False
+    write: bool = False
+    log: Any = None
     task: Any = None
     diagnosis: Any = None
     recordings: Any = None
@@ -91,8 +95,9 @@ def register() -> None:
     """Make known to Hydra what conf/config.yaml uses: the schema `base_run` and `${chosen:GROUP}`."""
     OmegaConf.register_new_resolver("chosen", _chosen_option, replace=True)
     schema = OmegaConf.structured(RunConfig)
-    for names_of_parameters in (schema.free, schema.bounds):
-        OmegaConf.set_struct(names_of_parameters, False)  # any name may be added; the task knows which exist
+    schema.log = OmegaConf.create({"columns": {}, "rename": {}})
+    for names in (schema.free, schema.bounds, schema.log.columns, schema.log.rename):
+        OmegaConf.set_struct(names, False)  # any name may be added; the task knows which exist
     ConfigStore.instance().store(name="base_run", node=schema)
 
 

@@ -62,6 +62,7 @@ def _meaning(folder: Path) -> str:
 
 
 _NOT_A_PART = {
+    "import": "What `task=import` makes of a log: `import=NAME` sets `log`, whose values are `log.KEY=VALUE`.",
     "experiment": "Settings that belong together. `+experiment=NAME` chooses one; where it lists a sweep, add `-m`.",
     "profile": "How much of an experiment is run: `profile=NAME`.",
     "published": "What the authors of public recordings found; only the tables read it.",

@@ -13,10 +13,10 @@ ESTIMATES_HEAD = ("parameter", "meaning", "unit", "before", "value", "95 % inter
 def summary(result: IdentificationResult) -> str:
     """The whole outcome as aligned plain text: errors, parameters, search and notes."""
     lines = [f"{result.title} ({result.plant})", headline(result), ""]
-    lines += _aligned(ERRORS_HEAD, error_rows(result), numbers=(3, 4, 5))
+    lines += aligned(ERRORS_HEAD, error_rows(result), numbers=(3, 4, 5))
     if result.estimates:
         rows = [(name, *rest) for name, _, *rest in estimate_rows(result.estimates)]
-        lines += ["", *_aligned((ESTIMATES_HEAD[0], *ESTIMATES_HEAD[2:]), rows, numbers=(2, 3))]
+        lines += ["", *aligned((ESTIMATES_HEAD[0], *ESTIMATES_HEAD[2:]), rows, numbers=(2, 3))]
     lines += ["", search_summary(result)]
     lines += [f"note: {note}" for note in result.notes]
     return "\n".join(lines)
@@ -87,7 +87,7 @@ def _cell(text: str) -> str:
     return text
 
 
-def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: tuple[int, ...]) -> list[str]:
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: tuple[int, ...]) -> list[str]:
     """Lines of a table with columns of equal width; columns in `numbers` are set flush right."""
     cells = [tuple(head), *((*(text or MISSING for text in row[:-1]), row[-1]) for row in rows)]
     widths = [max(len(row[column]) for row in cells) for column in range(len(head))]

@@ -11,7 +11,7 @@ from wipx.tasks.shared.job import Job
 
 SETTINGS = "config.yaml"  # stands beside the results of every task that has succeeded
 ERROR = "error.txt"
-WITHOUT_EFFECT = ("name", "label", "tracking")  # settings that change no result
+WITHOUT_EFFECT = ("name", "label", "tracking", "log", "write")  # settings that change no result
 
 
 def finished(job: Job) -> Mapping[str, Any] | None:

@@ -1,0 +1,1 @@
+"""Logs in the formats of the field, turned into recordings of contract sections 1 and 6."""

@@ -1,0 +1,1 @@
+"""One module per format of logs; each has a `LogFormat`."""
