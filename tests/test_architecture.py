@@ -74,7 +74,7 @@ def test_imports_point_one_way(path: Path):
             assert room != "report" or inner[0] == "core" or in_words, f"report reads finished results only, not {name}"
 
 
-@pytest.mark.parametrize("path", sorted((PACKAGE / "proof" / "blind_robots").glob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((PACKAGE / "proof" / "blind_robots").rglob("*.py")), ids=lambda path: path.stem)
 def test_blind_robots_share_no_physics_with_what_is_fitted(path: Path):
     for name in _imports(path):
         package, *inner = name.split(".")

@@ -20,6 +20,7 @@ from wipx.proof.blind_robots.scenario import (
     draw_scenario,
 )
 from wipx.proof.blind_robots.sizes import Draw, consequences, draw_details, draw_values, effect_names, families
+from wipx.proof.blind_robots.trees.cases import TREE_TIERS
 from wipx.proof.blind_robots.unmodelled_physics import draw_oddity, oddity_names
 
 TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hold 120 chances of a false alarm
@@ -120,10 +121,10 @@ def stratified(cases: int, first: int, tiers: tuple[str, ...], rng: np.random.Ge
     Args:
         cases: How many.
         first: Cases at the beginning that are to be a sample of all tiers too.
-        tiers: Those to choose from, keys of `TIERS` or of `DIRTY_TIERS`.
+        tiers: Those to choose from, keys of `TIERS`, of `DIRTY_TIERS` or of `trees.cases.TREE_TIERS`.
         rng: Of the order.
     """
-    everywhere = _apportioned(cases, np.array([{**TIERS, **DIRTY_TIERS}[tier] for tier in tiers]))
+    everywhere = _apportioned(cases, np.array([{**TIERS, **DIRTY_TIERS, **TREE_TIERS}[tier] for tier in tiers]))
     beginning = _apportioned(first, everywhere)
     blocks = (np.repeat(tiers, counts) for counts in (beginning, everywhere - beginning))
     return tuple(str(tier) for block in blocks for tier in rng.permutation(block))

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from wipx.proof.blind_robots.cases import Case
@@ -30,7 +31,7 @@ def case_files(case: Case) -> CaseFiles:
     """The files of a case."""
     robot = {"robot.yaml": yaml.safe_dump(robot_file(case), sort_keys=False)}
     visible, unseen = (
-        {**robot, **{f"r{number}.csv": _table(run) for number, run in enumerate(runs, start=1)}}
+        {**robot, **{f"r{number}.csv": table(run.columns) for number, run in enumerate(runs, start=1)}}
         for runs in (case.visible, case.unseen)
     )
     return CaseFiles(visible, unseen, truth(case))
@@ -93,7 +94,8 @@ def _times(effects: Mapping[str, Mapping[str, float]], runs: tuple[Run, ...]) ->
     return [{"low": begin, "high": end, "recording": f"r{i}.csv"} for i, end in enumerate(ends, start=1)]
 
 
-def _table(run: Run) -> str:
-    columns = [values.tolist() for values in run.columns.values()]
-    rows = (",".join(f"{value:.10g}" for value in row) for row in zip(*columns, strict=True))
-    return "\n".join([",".join(run.columns), *rows]) + "\n"
+def table(columns: Mapping[str, np.ndarray]) -> str:
+    """Columns of a recording, each of shape (rows,), as CSV."""
+    values = [column.tolist() for column in columns.values()]
+    rows = (",".join(f"{value:.10g}" for value in row) for row in zip(*values, strict=True))
+    return "\n".join([",".join(columns), *rows]) + "\n"
