@@ -23,7 +23,7 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
-from wipx.renamed import renamed
+from wipx.renamed import renamed, spelled_out
 from wipx.tasks.files.finished import ERROR, SETTINGS
 from wipx.tasks.shared.job import Job
 
@@ -53,7 +53,7 @@ def main() -> int:
     """
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
     # Hydra does not read overrides on both sides of a flag.
-    sys.argv[1:] = sorted(renamed(sys.argv[1:]), key=lambda argument: argument.startswith(FLAGS))
+    sys.argv[1:] = sorted(spelled_out(renamed(sys.argv[1:])), key=lambda argument: argument.startswith(FLAGS))
     register()
     started = time.time()
 

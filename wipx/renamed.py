@@ -17,6 +17,34 @@ RENAMED = (
 )
 
 
+SETUP = "task=new"  # the task whose settings have short names
+
+
+def spelled_out(arguments: list[str]) -> list[str]:
+    """The arguments with the short settings of task=new, path=, model= and log=, under their full names.
+
+    Several logs are given as log=[a.csv,b.csv], log=a.csv,b.csv or log=a.csv log=b.csv.
+    """
+    if SETUP not in arguments:
+        return arguments
+    kept, logs = [], []
+    for argument in arguments:
+        key, sign, value = argument.partition("=")
+        if not sign or key not in ("path", "model", "log"):
+            kept.append(argument)
+        elif key == "log":
+            logs += [_quoted(name.strip()) for name in value.removeprefix("[").removesuffix("]").split(",")]
+        else:
+            kept.append(f"task.{key}={_quoted(value)}")
+    return [*kept, f"task.log=[{','.join(logs)}]"] if logs else kept
+
+
+def _quoted(value: str) -> str:
+    """A value as Hydra takes it whatever signs it has."""
+    plain = value.strip("'\"")
+    return "'" + plain.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+
 def renamed(arguments: list[str]) -> list[str]:
     """The arguments with their names of today; one line on standard error for each that had another one."""
     return [_renamed(argument) for argument in arguments]

@@ -74,11 +74,13 @@ def gravity(batch: ModelBatch, tree: Tree) -> np.ndarray:
 def rest_inertia(tree: Tree) -> np.ndarray:
     """Diagonal of the mass matrix with all joints at zero, shape (N,) [kg or kg m^2]."""
     poses = [E.pose(link, 0.0, math.sin(0.0), math.cos(0.0)) for link in tree.links]
-    inertias = []
-    for link in tree.links:
-        mass, x, y, z, *rest = _numbers(np.array([link.mass]), link.com[:, None], link.inertia[..., None])[
-            :, 0
-        ].tolist()
-        inertias.append(E.Inertia(mass, (x, y, z), *rest))
+    inertias = [link_inertia(link) for link in tree.links]
     matrix = E.mass_matrix(tree, poses, inertias, [link.armature for link in tree.links])
     return np.array([matrix[i, i] for i in range(len(tree.links))], dtype=float)
+
+
+def link_inertia(link: Link) -> E.Inertia:
+    """Inertial numbers of a link as its file has them."""
+    numbers = _numbers(np.array([link.mass]), link.com[:, None], link.inertia[..., None])
+    mass, x, y, z, *rest = numbers[:, 0].tolist()
+    return E.Inertia(mass, (x, y, z), *rest)
