@@ -140,7 +140,5 @@ def without_laws(mujoco: Any, whole: Any, joints: tuple[str, ...], left_on: Left
             friction = passive and not model.actuator(i).name.endswith("_ripple")
             if joint in (left_on.joints if friction else left_on.drives):
                 continue
-            model.actuator_gaintype[i], model.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, 0
-            model.actuator_gainprm[i], model.actuator_biasprm[i] = 0.0, 0.0
-            model.actuator_damping[i] = 0.0
+            model.actuator_gear[i] = 0.0  # it turns nothing
     return model
