@@ -125,7 +125,7 @@ def test_with_the_runtime_the_error_is_that_of_wipx(number: int, tmp_path: Path,
     else:
         model = a_tree(2 + number % 5, rng, tmp_path)
     file = export_mjcf(model)
-    errors, said = judged(model, file, AnalyticSimulator(), recorded(model, rng), "all", lambda *_: None)
+    errors, said = judged(model, file, AnalyticSimulator(), recorded(model, rng), lambda *_: None)
     counts = [sum(s.status == status for s in said) for status in ("exact", "approximated", "lost")]
     shares = {
         way: max(errors.rms[way][name] / errors.rms[WIPX][name] for name in errors.noise_floor) for way in errors.rms

@@ -72,7 +72,6 @@ class ExportErrors:
     Attributes:
         horizon: Length of a prediction [s].
         windows: How many there were.
-        rule: Which recordings were predicted.
         rms: Root mean square error by way of simulating, then by column [unit of the column].
         noise_floor: Error that a right model would have, by column.
         traces: The recordings.
@@ -80,7 +79,6 @@ class ExportErrors:
 
     horizon: float
     windows: int
-    rule: str
     rms: Mapping[str, Mapping[str, float]]
     noise_floor: Mapping[str, float]
     traces: tuple[WaysTrace, ...]

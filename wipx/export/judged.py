@@ -28,7 +28,6 @@ def judged(
     file: ExportedFile,
     simulator: Simulator,
     recordings: tuple[Recording, ...],
-    rule: str,
     watch: Watcher,
 ) -> tuple[ExportErrors, tuple[Statement, ...]]:
     """Errors of the exported robot, and what becomes of its effects with what that costs.
@@ -38,7 +37,6 @@ def judged(
         file: What was made of it.
         simulator: For the completed model.
         recordings: To be predicted.
-        rule: Which they are, in words.
         watch: Is told what is done, and which share.
 
     Raises:
@@ -73,7 +71,7 @@ def judged(
         )
         for i, recording in enumerate(recordings)
     )
-    return ExportErrors(HORIZON, windows.count, rule, rms, same.floor(), traces), statements
+    return ExportErrors(HORIZON, windows.count, rms, same.floor(), traces), statements
 
 
 def _cost(

@@ -66,16 +66,15 @@ class Export:
     def _judged(
         self, job: Job, model: Model, file: ExportedFile, source: RecordingSource
     ) -> tuple[ExportedFile, ExportErrors]:
-        """The file's statements with what they cost on held-out recordings, and all errors there."""
+        """The file's statements with what they cost on the recordings, and all errors there."""
         described = source.describe().model.plant
         if described.coordinates != model.plant.coordinates or described.commands != model.plant.commands:
             raise InputError(
                 f"{job.model_path}: a model with {', '.join(model.plant.coordinates)}, the recordings in {source.path} "
                 f"are of a robot with {', '.join(described.coordinates)}; choose recordings of the same robot"
             )
-        split = source.split(source.load())
         with StageProgress("export") as progress:
-            errors, said = judged(model, file, job.part("sim"), split.held_out or split.fit, split.rule, progress)
+            errors, said = judged(model, file, job.part("sim"), source.load(), progress)
         return replace(file, statements=said), errors
 
 
@@ -107,7 +106,7 @@ def _content(job: Job, form: str, name: str, file: ExportedFile, errors: ExportE
     }
     if errors is not None:
         content["errors"] = {
-            "recordings": errors.rule,
+            "recordings": [trace.name for trace in errors.traces],
             "horizon_s": errors.horizon,
             "windows": errors.windows,
             "rms": errors.rms,
@@ -124,7 +123,7 @@ def _summary(model: Model, file: ExportedFile, errors: ExportErrors | None, path
     if file.note:
         lines.append(f"built from model.yaml, not from the owner's file: {file.note}")
     if errors is not None:
-        lines.append(f"rms error of {errors.windows} predictions over {errors.horizon:g} s ({errors.rule}):")
+        lines.append(f"rms error of {errors.windows} predictions over {errors.horizon:g} s:")
         for way, values in errors.rms.items():
             figures = ", ".join(f"{name} {value:.4g} {model.plant.unit_of(name)}" for name, value in values.items())
             lines.append(f"  {WORDS[way]}: {figures}")
