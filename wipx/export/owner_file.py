@@ -1,5 +1,6 @@
 """The owner's own model file with the bodies of a completed model, as far as that is possible."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,13 +9,14 @@ import numpy as np
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model, ModelBatch
-from wipx.core.tree import Link, Tree
+from wipx.core.tree import Link, ModelFile, Tree
 from wipx.recordings.robot_model import read_tree
 from wipx.sim.mechanism import LEAST, mechanism
 from wipx.sim.tree.frames import principal
 from wipx.sim.tree.inertias import inertial_numbers, lumped, numbers_of
 
 SAME = 1e-9  # of masses, lengths and moments, up to which two trees are one
+NO_BODY = "body {body} alone, without what is welded to it, cannot take the change of its mass or inertia"
 CHANGED = 1e-12  # relative, from which a number of a link counts as changed
 
 
@@ -39,20 +41,16 @@ def owner_file(model: Model, mujoco: Any) -> OwnerFile:
     source = None if tree is None else tree.source
     if tree is None or source is None:
         return OwnerFile(None, None)
-    if not source.path.is_file():
-        return OwnerFile(None, source.path, "the file is not there any more")
-    if any(source.locked.values()):
-        return OwnerFile(None, source.path, "joints are locked elsewhere than at zero")
+    note = unusable(tree, source)
+    if note:
+        return OwnerFile(None, source.path, note)
     try:
-        if not _same(read_tree(source.path, dict(source.locked)), tree):
-            return OwnerFile(None, source.path, "the file has changed since")
         spec = mujoco.MjSpec.from_file(str(source.path))
-        for name in source.locked:
-            spec.delete(spec.joint(name))
+        _lock(mujoco, spec, tuple(source.locked))
         compiled = spec.compile()
-    except (InputError, ValueError) as error:
+    except ValueError as error:
         return OwnerFile(None, source.path, str(error).strip().splitlines()[0].rstrip(".;"))
-    note = _moved_masses(model, tree, spec, compiled)
+    note = _move_masses(model, tree, spec, compiled)
     if note:
         return OwnerFile(None, source.path, note)
     gravity = mechanism(model).tree.gravity
@@ -63,7 +61,41 @@ def owner_file(model: Model, mujoco: Any) -> OwnerFile:
     return OwnerFile(spec, source.path)
 
 
-def _same(one: Tree, other: Tree) -> bool:
+def _lock(mujoco: Any, spec: Any, joints: tuple[str, ...]) -> None:
+    """Fix joints at zero: they go, with their actuators, their sensors and their places in keyframes."""
+    if not joints:
+        return
+    compiled = spec.compile()
+    places = [int(compiled.joint(name).qposadr[0]) for name in joints]
+    rates = [int(compiled.joint(name).dofadr[0]) for name in joints]
+    in_joint, joint_type = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtObj.mjOBJ_JOINT
+    idle = [i for i, each in enumerate(spec.actuators) if each.trntype == in_joint and each.target in joints]
+    for key in spec.keys:
+        for name, gone in (("qpos", places), ("qvel", rates), ("ctrl", idle)):
+            values = np.array(getattr(key, name))
+            setattr(key, name, np.delete(values, gone) if len(values) else values)
+    for each in [spec.actuators[i] for i in idle]:
+        spec.delete(each)
+    for each in [sensor for sensor in spec.sensors if sensor.objtype == joint_type and sensor.objname in joints]:
+        spec.delete(each)
+    for name in joints:
+        spec.delete(spec.joint(name))
+
+
+def unusable(tree: Tree, source: ModelFile) -> str:
+    """Why nothing can be built from the file that a tree was read from; empty where it can."""
+    if not source.path.is_file():
+        return "the file is not there any more"
+    if any(source.locked.values()):
+        return "joints are locked elsewhere than at zero"
+    try:
+        same = _same_tree(read_tree(source.path, dict(source.locked)), tree)
+    except InputError as error:
+        return str(error)
+    return "" if same else "the file has changed since"
+
+
+def _same_tree(one: Tree, other: Tree) -> bool:
     """Whether two trees have the same links."""
     if one.joints != other.joints:
         return False
@@ -76,22 +108,49 @@ def _same(one: Tree, other: Tree) -> bool:
     return True
 
 
-def _moved_masses(model: Model, tree: Tree, spec: Any, compiled: Any) -> str:
-    """Add what the model changes of each link's ten inertial numbers to its body; why that cannot be, or nothing."""
+def changed_links(model: Model, tree: Tree) -> Iterator[tuple[Link, np.ndarray]]:
+    """Links with other inertial numbers than in the owner's file, and by how much each of the ten differs."""
     plain = ModelBatch(Model(model.plant, model.plant.complete({}, "model"), {}))
     for link in tree.links:
         before, after = (inertial_numbers(batch, link)[:, 0] for batch in (plain, ModelBatch(model)))
-        if np.abs(after - before).max() <= CHANGED * np.abs(before).max():
-            continue
-        mass, com, inertia = lumped(_own_numbers(link, compiled) + after - before)
-        moments = np.linalg.eigvalsh(inertia)
-        if mass <= 0.0 or moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - SAME):
-            return (
-                f"body {link.body} alone, without what is welded to it, cannot take the change of its mass or inertia"
-            )
-        body, turn = spec.body(link.body), link.body_rotation
-        sizes, axes = principal(turn.T @ inertia @ turn, LEAST)
-        body.mass, body.ipos, body.inertia = mass, turn.T @ (com - link.body_place), sizes
+        if np.abs(after - before).max() > CHANGED * np.abs(before).max():
+            yield link, after - before
+
+
+@dataclass(frozen=True)
+class BodyMass:
+    """Mass of one body.
+
+    Attributes:
+        mass: [kg].
+        com: Centre in the body's own frame, shape (3,) [m].
+        inertia: About the centre in the body's axes, shape (3, 3) [kg m^2].
+    """
+
+    mass: float
+    com: np.ndarray
+    inertia: np.ndarray
+
+    @classmethod
+    def of(cls, link: Link, numbers: np.ndarray) -> "BodyMass | None":
+        """From ten inertial numbers (10,) in the link's frame; None where no rigid body has them."""
+        mass, com, inertia = lumped(numbers)
+        least, middle, most = np.linalg.eigvalsh(inertia)
+        if mass <= 0.0 or least <= 0.0 or least + middle < most * (1.0 - SAME):
+            return None
+        turn = link.body_rotation
+        return cls(mass, turn.T @ (com - link.body_place), turn.T @ inertia @ turn)
+
+
+def _move_masses(model: Model, tree: Tree, spec: Any, compiled: Any) -> str:
+    """Add what the model changes of each link to its body; why that cannot be, or nothing."""
+    for link, change in changed_links(model, tree):
+        found = BodyMass.of(link, _own_numbers(link, compiled) + change)
+        if found is None:
+            return NO_BODY.format(body=link.body)
+        sizes, axes = principal(found.inertia, LEAST)
+        body = spec.body(link.body)
+        body.mass, body.ipos, body.inertia = found.mass, found.com, sizes
         body.iquat, body.explicitinertial = quaternion(axes), True
         body.fullinertia = np.full(6, np.nan)
     return ""

@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,10 +10,10 @@ from wipx.core.export_result import Statement, approximated, exact, lost
 from wipx.core.model import Model
 from wipx.core.tree import Link, Tree
 from wipx.export.mjcf import STEP, ExportedFile, compiled_urdf
+from wipx.export.owner_urdf import UNLIMITED, owner_urdf
 from wipx.sim.mechanism import EVENT, Mechanism, check_possible, mechanism
 from wipx.sim.urdf import urdf
 
-UNLIMITED = 1e9  # of efforts and velocities, which URDF wants
 DRY = {
     "coulomb": ("F_c", "friction of the joint"),
     "stribeck": ("F_c", "friction of the joint, without the static level"),
@@ -41,27 +42,36 @@ def export_urdf(model: Model, step: float | None = None) -> ExportedFile:
         InputError: MuJoCo, which judges it, is not installed, or a link is no rigid body.
     """
     check_possible(model, "mujoco")
-    found = _upright(mechanism(model))
+    found = mechanism(model)
+    turn = _down(found.tree.gravity)
+    found = _upright(found, turn)
     joints = {link.joint: _joint(model, link) for link in found.tree.links}
     root = ElementTree.fromstring(urdf(found, model.plant.kind, with_event=False, joints=joints))
     ElementTree.indent(root)
     text = '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
     compiled = compiled_urdf(model, found, text, step or STEP)
-    return ExportedFile(text, compiled, float(compiled.opt.timestep), None, "", _statements(model, found.tree), False)
+    terms = {name: ElementTree.fromstring(f"<joint>{each}</joint>") for name, each in joints.items()}
+    own, note = owner_urdf(model, terms, turn)
+    source = model.plant.tree.source.path if own and model.plant.tree and model.plant.tree.source else None
+    said = _statements(model, found.tree)
+    return ExportedFile(own or text, compiled, float(compiled.opt.timestep), source, note, said, has_runtime=False)
 
 
-def _upright(found: Mechanism) -> Mechanism:
-    """The same robot on a ground that is turned so that gravity points down, as URDF has it."""
-    gravity = found.tree.gravity
+def _down(gravity: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) of the ground after which gravity (3,) points down, as URDF has it."""
     size = float(np.linalg.norm(gravity))
-    if not size or gravity[2] == -size:
+    return _turning(gravity / size, np.array([0.0, 0.0, -1.0])) if size else np.eye(3)
+
+
+def _upright(found: Mechanism, turn: np.ndarray) -> Mechanism:
+    """The same robot on a ground that is turned."""
+    if (turn == np.eye(3)).all():
         return found
-    turn = _turning(gravity / size, np.array([0.0, 0.0, -1.0]))
     links = []
     for link in found.tree.links:
         moved = {"rotation": turn @ link.rotation, "place": turn @ link.place} if link.parent < 0 else {}
-        links.append(Link(**{**vars(link), **moved}))
-    return Mechanism(Tree(tuple(links), np.array([0.0, 0.0, -size])), found.coming)
+        links.append(replace(link, **moved))
+    return Mechanism(Tree(tuple(links), turn @ found.tree.gravity), found.coming)
 
 
 def _turning(one: np.ndarray, other: np.ndarray) -> np.ndarray:
