@@ -18,6 +18,7 @@ LAYERS = (
     {"tasks"},
     {"proof"},
     {"config", "renamed"},
+    {"sweep"},
     {"app"},
     {"__main__"},
 )
@@ -34,8 +35,8 @@ RANK = {room: rank for rank, layer in enumerate(LAYERS) for room in layer}
 RANK_IN_DIAGNOSIS = {room: rank for rank, layer in enumerate(DIAGNOSIS) for room in layer}
 ALLOWED_IN = {
     "mlflow": {"tracking"},
-    "hydra": {"config", "app", "__main__"},
-    "omegaconf": {"config", "app", "__main__"},
+    "hydra": {"config", "sweep", "app", "__main__"},
+    "omegaconf": {"config", "sweep", "app", "__main__"},
     "pybullet": {"sim"},
     "mujoco": {"sim", "baselines", "export"},
     "torch": {"learn", "baselines"},

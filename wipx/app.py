@@ -3,12 +3,14 @@
 What the configuration may hold is in `wipx.config`; what a run does is in `wipx.tasks`.
 """
 
+import errno
 import os
+import shutil
 import sys
 import time
 import traceback
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
@@ -23,25 +25,27 @@ from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBase
 
 from wipx.config import RunConfig, build, mistyped_root_key, register, typed, unknown_key
 from wipx.core.errors import InputError, unknown_name
-from wipx.renamed import renamed, spelled_out
+from wipx.core.locked import locked
+from wipx.core.whole_file import write_whole
+from wipx.renamed import renamed, spelled_out, unambiguous
+from wipx.sweep import RunFailed, watch_ended
 from wipx.tasks.files.finished import ERROR, SETTINGS
+from wipx.tasks.files.results import UNFINISHED
+from wipx.tasks.files.sweep_folder import RUNNING, begin_job, end_job
 from wipx.tasks.shared.job import Job
 
 ROOT_KEYS = tuple(item.name for item in fields(RunConfig))
 FLAGS = ("-m", "--multirun", "--config-dir=")
 DONE, DEFECT, INPUT_AT_FAULT, INTERRUPTED = 0, 1, 2, 130
-
-
-class JobFailed(BaseException):
-    """A single run failed; no `Exception`, so that Hydra does not add a report of its own.
-
-    Attributes:
-        error: Why.
-    """
-
-    def __init__(self, error: Exception) -> None:
-        super().__init__(str(error))
-        self.error = error
+AGAIN = "and the same command does the rest"
+REFUSED_BY_DISK = {
+    errno.ENOSPC: f"make room; {AGAIN}",
+    errno.EDQUOT: f"make room; {AGAIN}",
+    errno.EROFS: "choose a folder that can be written to",
+    errno.EACCES: "choose a folder that can be written to",
+}
+LAUNCHERS = ("joblib", "submitit", "ray")  # packages whose errors are a launcher's
+NEW_LINE = "\n"
 
 
 def main() -> int:
@@ -52,8 +56,6 @@ def main() -> int:
         fault; 130 interrupted.
     """
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
-    # Hydra does not read overrides on both sides of a flag.
-    sys.argv[1:] = sorted(spelled_out(renamed(sys.argv[1:])), key=lambda argument: argument.startswith(FLAGS))
     register()
     started = time.time()
 
@@ -62,11 +64,15 @@ def main() -> int:
             _run_reported(config, out)
 
     try:
-        hydra.main(version_base="1.3", config_path=str(configuration_folder()), config_name="config")(run)()
-    except JobFailed as failure:
+        arguments = unambiguous(spelled_out(renamed(sys.argv[1:])))
+        # Hydra does not read overrides on both sides of a flag.
+        sys.argv[1:] = sorted(arguments, key=lambda argument: argument.startswith(FLAGS))
+        with watch_ended():
+            hydra.main(version_base="1.3", config_path=str(configuration_folder()), config_name="config")(run)()
+    except RunFailed as failure:
         return _report(failure.error, explanation(failure.error))
     except OSError as error:
-        return _report(error, explanation(error) or _folder_at_fault(error))
+        return _report(error, explanation(error) if isinstance(error, HydraException) else _folder_at_fault(error))
     except Exception as error:
         return _report(error, explanation(error))
     except KeyboardInterrupt:
@@ -116,7 +122,7 @@ def run_task(config: DictConfig, out: Path) -> None:
         overrides=tuple(HydraConfig.get().overrides.task) if HydraConfig.initialized() else (),
     )
     part("task").run(job)
-    OmegaConf.save(OmegaConf.create(settings), out / SETTINGS)
+    write_whole(out / SETTINGS, OmegaConf.to_yaml(OmegaConf.create(settings)).rstrip())
 
 
 def sweep_of(out: Path) -> Path | None:
@@ -141,6 +147,11 @@ def explanation(error: BaseException) -> str | None:
         text = _value_at_fault(cause)
     elif isinstance(error, HydraException):
         text = _without_details(str(error))
+    elif isinstance(error, OSError) and error.errno in REFUSED_BY_DISK:
+        place = f"{error.filename}: " if error.filename else ""
+        text = f"{place}{error.strerror}; {REFUSED_BY_DISK[error.errno]}"
+    elif type(error).__module__.partition(".")[0] in LAUNCHERS:
+        text = f"the launcher gave up: {str(error).strip().partition(NEW_LINE)[0]}; what is finished is kept, {AGAIN}"
     else:
         return None
     return " ".join(text.split())
@@ -149,15 +160,29 @@ def explanation(error: BaseException) -> str | None:
 def _run_reported(config: DictConfig, out: Path) -> None:
     """Run the task; a failure leaves in the form that Hydra hands on without adding to it."""
     try:
-        run_task(config, out)
+        if HydraConfig.get().mode is RunMode.RUN:
+            run_task(config, out)
+        else:
+            _run_job(config, out)
     except Exception as error:
         if HydraConfig.get().mode is RunMode.RUN:
-            raise JobFailed(error) from error
-        line = explanation(error) or f"{type(error).__name__}: {error}"
-        (out / ERROR).write_text(f"{line}\n\n{traceback.format_exc()}", encoding="utf-8")
-        if isinstance(error, InputError):
-            raise
-        raise RuntimeError(f"the job in {out} failed") from error
+            raise RunFailed(error) from error
+        line = explanation(error)
+        with suppress(OSError):  # a full disk has no place for its own error
+            told = line or f"{type(error).__name__}: {error}"
+            (out / ERROR).write_text(f"{told}\n\n{traceback.format_exc()}", encoding="utf-8")
+        raise (RuntimeError(f"the job in {out} failed") if line is None else InputError(line)) from error
+
+
+def _run_job(config: DictConfig, out: Path) -> None:
+    """Run one job of a sweep; another process that works on the same one is waited for."""
+    with locked(out / RUNNING):
+        for unfinished in out.glob(f"{UNFINISHED}*"):  # of a process that was killed
+            shutil.rmtree(unfinished, ignore_errors=True)
+        asked = OmegaConf.to_container(HydraConfig.get().overrides.task, resolve=False)
+        note = begin_job(out, cast(list[str], asked))
+        run_task(config, out)
+        end_job(out, note)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ themselves are in `conf/`.
 
 import importlib
 import types
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -92,8 +93,7 @@ class RunConfig:
 
 
 def register() -> None:
-    """Make known to Hydra what conf/config.yaml uses: the schema `base_run` and `${chosen:GROUP}`."""
-    OmegaConf.register_new_resolver("chosen", _chosen_option, replace=True)
+    """Make known to Hydra the schema `base_run`, which conf/config.yaml uses."""
     schema = OmegaConf.structured(RunConfig)
     schema.log = OmegaConf.create({"columns": {}, "rename": {}})
     for names in (schema.free, schema.bounds, schema.log.columns, schema.log.rename):
@@ -105,6 +105,12 @@ def _chosen_option(group: str, *, _root_: DictConfig) -> str:
     """The option that is used of a group: while a sweep is prepared only the configuration itself knows it."""
     composed = _root_.hydra if "hydra" in _root_ else HydraConfig.get()
     return str(composed.runtime.choices[group])
+
+
+# A process that a launcher starts knows both, since it imports this module.
+OmegaConf.register_new_resolver("chosen", _chosen_option, replace=True)
+# Options in conf/hydra/launcher have the names of the plugins' own, whose keys and types thus hold for them.
+warnings.filterwarnings("ignore", message=r"\s*'hydra/launcher/\w+' is validated against ConfigStore schema")
 
 
 def unknown_key(key: str, valid: Collection[str], where: str) -> InputError:

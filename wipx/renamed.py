@@ -1,7 +1,9 @@
-"""Names of keys, groups and options that have another name: the command line takes both, and says which one it is."""
+"""The command line before Hydra reads it: names of today for keys and options that have another name, no key twice."""
 
 import re
 import sys
+
+from wipx.core.errors import InputError
 
 # What an argument begins with, after +, ++ or ~, and what stands there instead.
 RENAMED = (
@@ -45,9 +47,30 @@ def _quoted(value: str) -> str:
     return "'" + plain.replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
+# Tasks that are asked about an experiment in place of running it: experiment=NAME is a setting of theirs.
+ASKED_ABOUT = ("task=status", "task=log_runs")
+
+
 def renamed(arguments: list[str]) -> list[str]:
     """The arguments with their names of today; one line on standard error for each that had another one."""
-    return [_renamed(argument) for argument in arguments]
+    names = [_renamed(argument) for argument in arguments]
+    if not any(task in names for task in ASKED_ABOUT):
+        return names
+    return [re.sub(r"\A\+?experiment=", "task.experiment=", name) for name in names]
+
+
+def unambiguous(arguments: list[str]) -> list[str]:
+    """The arguments.
+
+    Raises:
+        InputError: a key is given two values.
+    """
+    given: dict[str, str] = {}
+    for argument in arguments:
+        key, equals, _ = argument.lstrip("+").partition("=")
+        if equals and not key.startswith("-") and given.setdefault(key, argument) != argument:
+            raise InputError(f"{given[key]} and {argument} contradict each other; leave one of them out")
+    return arguments
 
 
 def _renamed(argument: str) -> str:

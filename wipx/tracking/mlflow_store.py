@@ -39,7 +39,7 @@ class NoTracking:
     def log(self, out: Path) -> None:
         """Do nothing; as `MlflowTracking.log`."""
 
-    def send(self, out: Path) -> None:
+    def send(self, out: Path) -> bool:
         """Refuse, since there is no place to log to.
 
         Raises:
@@ -90,8 +90,8 @@ class MlflowTracking:
         except InputError as error:
             print(f"{out}: not logged; log it later with task=log_runs task.folder='{out}': {error}", file=sys.stderr)
 
-    def send(self, out: Path) -> None:
-        """Log the run in a folder, if it was not logged to this store before.
+    def send(self, out: Path) -> bool:
+        """Log the run in a folder, if it was not logged to this store before; returns whether it was not.
 
         A logging that was interrupted goes on: the run is found by its key, and what it has is written again.
 
@@ -100,11 +100,11 @@ class MlflowTracking:
         """
         note = read_run_note(out)
         if self.store in read_log_note(out, note.key).runs:
-            return
+            return False
         with self._opened() as (client, experiment), locked(out / LOCK):
             logged = read_log_note(out, note.key)
             if self.store in logged.runs:
-                return
+                return False
             tags = {**note.tags, KEY: note.key}
             if note.in_sweep:
                 tags["mlflow.parentRunId"] = self._parent(client, experiment, out.parent)
@@ -115,6 +115,7 @@ class MlflowTracking:
                 client.log_artifact(run_id, str(out / name))
             client.set_terminated(run_id, "FINISHED", end_time=_ms(note.ended))
             write_log_note(out, logged.with_run(self.store, run_id))
+        return True
 
     def log_sweep(self, sweep: Path, metrics: Mapping[str, float], artifacts: Sequence[Path]) -> None:
         """Log what was made of all jobs of a sweep to the sweep's own run; one line tells where that is not possible.

@@ -1,7 +1,6 @@
 """What is logged of a run, noted in its folder before it is logged: nothing is lost where MLflow cannot be reached."""
 
 import json
-import os
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wipx.core.errors import InputError
+from wipx.core.whole_file import write_whole
 
 RUN = "run.json"  # the note, beside the results
 LOGGED = ".mlflow.json"  # where it was logged
@@ -103,16 +103,6 @@ def read_log_note(folder: Path, key: str | None) -> LogNote:
 def write_log_note(folder: Path, note: LogNote) -> None:
     """Note where a folder was logged."""
     write_whole(folder / LOGGED, json.dumps({"key": note.key, "runs": dict(note.runs)}))
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        draft.write_text(f"{text}\n", encoding="utf-8")
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _plain(value: Any) -> Any:

@@ -17,6 +17,7 @@ from wipx.core.load import Load
 from wipx.core.locked import locked
 from wipx.core.model import Model
 from wipx.core.recording import Recording
+from wipx.core.whole_file import write_whole
 from wipx.hardware.target import Target, Trial
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.recordings.model_file import write_model
@@ -106,7 +107,7 @@ def write_robot(path: Path, nominal: Model, feedback: tuple[StateFeedback, float
             name: {"mass": load.mass, "height": load.height, "side": load.side, "recordings": f"{name}_*.csv"}
             for name, load in loads.items()
         }
-    path.write_text(yaml.safe_dump(robot, sort_keys=False), encoding="utf-8")
+    write_whole(path, yaml.safe_dump(robot, sort_keys=False).rstrip())
 
 
 def write_recording(path: Path, recording: Recording) -> None:
