@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from moving_arm import MovingArm, made_arm
 
 PENDULUM = """
 plant: pendulum
@@ -41,3 +42,9 @@ def write_csv() -> Callable[[Path, dict[str, np.ndarray]], Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def moving_arm(tmp_path_factory: pytest.TempPathFactory) -> MovingArm:
+    """A motion of an arm with the forces that it needs."""
+    return made_arm(tmp_path_factory.mktemp("model"))

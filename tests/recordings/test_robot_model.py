@@ -71,7 +71,14 @@ def test_a_locked_joint_joins_its_links(tmp_path: Path):
         (ARM.replace('damping="0.1"', 'stiffness="3"'), "joint shoulder has a spring"),
         ("<mujoco><worldbody/></mujoco>", "no joint"),
         ("joints: 3", "expected an MJCF or URDF file"),
-        (ARM.replace(BODY, "", 1).replace(BODY, ""), "mass"),
+        (ARM.replace(BODY, "", 1).replace(BODY, ""), "body upper moves and has no mass"),
+        (ARM.replace("0.01 0.01 0.001", "0.1 0.01 0.001", 1), "body upper has an inertia that no body can have"),
+        (ARM[:-20], "not XML"),
+        (ARM.replace('"wrist"', '"t"'), "the column t would be time"),
+        (ARM.replace('"wrist"', '"shoulder_dot"'), "column shoulder_dot would be the rate of joint shoulder"),
+        (ARM.replace('"wrist"', '"u_shoulder"'), "column u_shoulder would be the command of joint shoulder"),
+        (ARM.replace('"wrist"', '"environment"'), "the site environment"),
+        (ARM.replace('"wrist"', '"left/wrist"'), "'/' in its name"),
     ],
 )
 def test_what_is_no_open_tree_is_refused_in_one_line(text: str, message: str, tmp_path: Path):

@@ -1,6 +1,7 @@
 """MJCF and URDF files as trees; MuJoCo reads both."""
 
 import importlib
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from wipx.core.drive import Drive
 from wipx.core.errors import InputError
 from wipx.core.tree import Link, ModelFile, Tree
+from wipx.recordings.tree_names import check_names
 
 
 def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
@@ -68,12 +70,12 @@ def _model(mujoco: Any, path: Path) -> Any:
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:
-        raise InputError(f"{path}: {_first_line(error)}; expected an MJCF or URDF file") from error
+        raise InputError(f"{path}: {_in_words(error)}; expected an MJCF or URDF file") from error
     _strip(mujoco, spec, path)
     try:
         model = spec.compile()
     except ValueError as error:
-        raise InputError(f"{path}: {_first_line(error)}; correct the file") from error
+        raise InputError(f"{path}: {_in_words(error)}; correct the file") from error
     _refuse(model, path)
     return model
 
@@ -85,8 +87,19 @@ def _mujoco(path: Path) -> Any:
         raise InputError(f'{path} is read by MuJoCo, which is not installed; pip install "mujoco>=4.0,<5"') from error
 
 
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0].rstrip(".;") if str(error).strip() else type(error).__name__
+def _in_words(error: Exception) -> str:
+    """What MuJoCo says of a file, in one line."""
+    text = str(error).strip() or type(error).__name__
+    element = re.search(r"Element name '([^']*)'", text)
+    body = f"body {element.group(1)}" if element else "a body"
+    line = re.search(r"Line number=(\d+)", text)
+    if line is not None:
+        return f"line {line.group(1)} is not XML"
+    if "mjMINVAL" in text:
+        return f"{body} moves and has no mass or no inertia; give it an inertial with both above zero"
+    if "A + B >= C" in text:
+        return f"{body} has an inertia that no body can have: one principal moment exceeds the sum of the other two"
+    return text.splitlines()[0].rstrip(".;") + (f" ({body})" if element else "")
 
 
 def _strip(mujoco: Any, spec: Any, path: Path) -> None:
@@ -191,6 +204,7 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
     source = ModelFile(path.resolve(), locked)
     tree = Tree(tuple(links), np.array(model.opt.gravity, dtype=float), source)
     _check_masses(tree, path)
+    check_names(tree, path)
     return tree
 
 

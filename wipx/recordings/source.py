@@ -3,6 +3,7 @@
 The settings are plain values, so that a YAML file of `conf/recordings` can hold them.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -16,6 +17,7 @@ from wipx.core.load import Load
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording, RecordingSplit
 from wipx.recordings.held_out import FEWEST_ROWS, split_recordings
+from wipx.recordings.plausible import check_recording
 from wipx.recordings.robot_file import RobotDescription, read_robot, robot_from_mapping
 from wipx.recordings.signals import Signal, plain_signal, recorded_columns, required_columns
 from wipx.recordings.strict_yaml import finite_number
@@ -94,7 +96,12 @@ class RecordingSource:
         for pattern in self.spans:
             if not any(fnmatch(name, pattern) for name in paths):
                 raise InputError(f"recordings.spans: {pattern} matches none of {', '.join(paths)}; correct the pattern")
-        return tuple(self._recording(name, path, robot) for name, path in paths.items())
+        recordings = tuple(self._recording(name, path, robot) for name, path in paths.items())
+        if robot.model.plant.tree is not None:
+            for recording in recordings:
+                for warning in check_recording(recording, robot.model.plant, robot.signals):
+                    print(f"warning: {warning}", file=sys.stderr)
+        return recordings
 
     def loads(self, recordings: tuple[Recording, ...]) -> tuple[Load | None, ...]:
         """What is known to have been on the body in each of the recordings; None where it was nothing.
@@ -220,9 +227,15 @@ def _check_present(column: str, signal: Signal, table: Table, plant: Plant) -> N
         if needed == column:
             raise InputError(
                 f"{table.path}: column {needed} [{plant.unit_of(column)}] is missing; rename one of {have}, "
-                f"or name its column under signals in {ROBOT_FILE}"
+                f"or name its column under signals in {ROBOT_FILE}{_or_locked(column, plant)}"
             )
         raise InputError(f"{table.path}: column {needed} of signals.{column} is missing; the file has {have}")
+
+
+def _or_locked(column: str, plant: Plant) -> str:
+    if plant.tree is None or column not in plant.coordinates:
+        return ""
+    return f"; a joint that does not move is listed as locked: {{{column}: 0.0}}"
 
 
 def _read(signal: Signal, table: Table, first: int, last: int) -> np.ndarray:

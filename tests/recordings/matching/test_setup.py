@@ -4,75 +4,33 @@ The logs are exact: a motion of sines, and the forces that the robot needs for i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from moving_arm import JOINTS, MovingArm
 
 from wipx.core.drive import Drive
 from wipx.core.errors import InputError
-from wipx.core.tree import Tree
 from wipx.recordings.matching.log import Log, read_log
 from wipx.recordings.matching.names import read_name
 from wipx.recordings.matching.setup import Setup, set_up
-from wipx.recordings.robot_model import read_tree
-from wipx.sim.tree.inverse import needed_forces
 
-JOINTS = ("pan", "shoulder", "elbow", "wrist")
-ARM = """<mujoco><compiler angle="radian"/><worldbody><body name="base">
-<inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.01"/>
-<joint name="pan" axis="0 0 1" range="-3 3"/>
-<body name="upper" pos="0 0 0.2"><inertial pos="0.2 0 0" mass="0.9" diaginertia="0.002 0.012 0.012"/>
-<joint name="shoulder" axis="0 -1 0" range="-2 2"/>
-<body name="lower" pos="0.4 0 0"><inertial pos="0.15 0 0" mass="0.5" diaginertia="0.0005 0.005 0.005"/>
-<joint name="elbow" axis="0 -1 0" range="-2.6 2.6"/>
-<body name="hand" pos="0.3 0 0"><inertial pos="0.08 0 0.02" mass="0.25" diaginertia="0.0005 0.001 0.001"/>
-<joint name="wrist" axis="1 0 0" range="-3 3"/></body></body></body></body></worldbody></mujoco>"""
 SHUFFLED = [2, 0, 3, 1]
 TICKS = 4096.0 / (2.0 * np.pi)
 
 
-@dataclass(frozen=True)
-class Run:
-    t: np.ndarray
-    q: np.ndarray
-    u: np.ndarray
-
-
-@pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Tree:
-    path = tmp_path_factory.mktemp("model") / "arm.xml"
-    path.write_text(ARM, encoding="utf-8")
-    return read_tree(path)
-
-
-@pytest.fixture(scope="module")
-def run(tree: Tree) -> Run:
-    rng, t = np.random.default_rng(3), np.arange(0.0, 10.0, 0.02)
-    frequencies, phases = rng.uniform(0.1, 0.6, (3, 4)), rng.uniform(0.0, 6.3, (3, 4))
-    angle = 2.0 * np.pi * frequencies[..., None] * t + phases[..., None]
-    size, turning = np.array([0.35, 0.3, 0.35, 0.5])[:, None], 2.0 * np.pi * frequencies[..., None]
-    middle = np.array([0.3, 0.4, -0.5, 0.2])
-    q = (size * np.sin(angle)).sum(axis=0).T + middle
-    v = (size * turning * np.cos(angle)).sum(axis=0).T
-    a = -(size * turning**2 * np.sin(angle)).sum(axis=0).T
-    friction = np.array([0.1, 0.15, 0.08, 0.02]) * np.sign(v) + np.array([0.1, 0.05, 0.02, 0.02]) * v
-    u = needed_forces(tree, q, v, a) + friction
-    return Run(t, q + 2e-4 * rng.normal(size=q.shape), u + 0.01 * rng.normal(size=u.shape))
-
-
-def log_of(run: Run, names: Sequence[str], columns: np.ndarray) -> Log:
-    return Log(Path("run.csv"), dict(zip(names, columns.T, strict=True)), "t", "s", 0.0, run.t, ())
+def log_of(moving_arm: MovingArm, names: Sequence[str], columns: np.ndarray) -> Log:
+    return Log(Path("run.csv"), dict(zip(names, columns.T, strict=True)), "t", "s", 0.0, moving_arm.t, ())
 
 
 def placed(setup: Setup) -> list[str]:
     return [setup.signals[joint].column for joint in JOINTS]
 
 
-def test_an_honest_log_stays_as_its_names_say(tree: Tree, run: Run):
+def test_an_honest_log_stays_as_its_names_say(moving_arm: MovingArm):
     names = [*JOINTS, *(f"u_{joint}" for joint in JOINTS)]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([run.q, run.u]))])
+    setup = set_up(moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([moving_arm.q, moving_arm.u]))])
     for joint in JOINTS:
         assert setup.signals[joint].column == joint
         assert (setup.signals[joint].unit, setup.signals[joint].scale, setup.signals[joint].offset) == ("rad", 1.0, 0.0)
@@ -80,30 +38,38 @@ def test_an_honest_log_stays_as_its_names_say(tree: Tree, run: Run):
         assert setup.drives[joint] == Drive("torque", logged="motor")  # friction shows in the forces
 
 
-def test_columns_without_names_find_their_joints_by_the_motion(tree: Tree, run: Run):
-    columns = np.hstack([run.q[:, SHUFFLED], run.u[:, SHUFFLED]])
-    setup = set_up(tree, {}, [log_of(run, list("abcdefgh"), columns)])
+def test_columns_without_names_find_their_joints_by_the_motion(moving_arm: MovingArm):
+    columns = np.hstack([moving_arm.q[:, SHUFFLED], moving_arm.u[:, SHUFFLED]])
+    setup = set_up(moving_arm.tree, {}, [log_of(moving_arm, list("abcdefgh"), columns)])
     assert placed(setup) == ["b", "d", "a", "c"]
     assert [setup.signals[f"u_{joint}"].column for joint in JOINTS] == ["f", "h", "e", "g"]
     assert any("say otherwise" in doubt for doubt in setup.doubts)
 
 
-def test_swapped_joints_are_told_in_spite_of_their_names(tree: Tree, run: Run):
+@pytest.mark.slow
+def test_swapped_joints_are_told_in_spite_of_their_names(moving_arm: MovingArm):
     names, order = [*JOINTS, *(f"u_{joint}" for joint in JOINTS)], [0, 2, 1, 3]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([run.q[:, order], run.u[:, order]]))])
+    setup = set_up(
+        moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([moving_arm.q[:, order], moving_arm.u[:, order]]))]
+    )
     assert placed(setup) == ["pan", "elbow", "shoulder", "wrist"]
 
 
-def test_degrees_are_told_by_limits_and_motion(tree: Tree, run: Run):
+def test_degrees_are_told_by_limits_and_motion(moving_arm: MovingArm):
     names = [*(f"{joint}_pos" for joint in JOINTS), *(f"{joint}_effort" for joint in JOINTS)]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([np.rad2deg(run.q), run.u]))])
+    setup = set_up(
+        moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([np.rad2deg(moving_arm.q), moving_arm.u]))]
+    )
     assert {setup.signals[joint].unit for joint in JOINTS} == {"deg"}
 
 
-def test_signs_and_zeros_are_told_by_gravity(tree: Tree, run: Run):
+@pytest.mark.slow
+def test_signs_and_zeros_are_told_by_gravity(moving_arm: MovingArm):
     sign, zero = np.array([1.0, -1.0, 1.0, 1.0]), np.array([0.0, np.pi / 2.0, -0.7, 0.0])
     names = [*JOINTS, *(f"u_{joint}" for joint in JOINTS)]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([(run.q + zero) * sign, run.u * sign]))])
+    setup = set_up(
+        moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([(moving_arm.q + zero) * sign, moving_arm.u * sign]))]
+    )
     signals = setup.signals
     assert (signals["shoulder"].scale, signals["u_shoulder"].scale, signals["elbow"].scale) == (-1.0, -1.0, 1.0)
     assert signals["shoulder"].offset == pytest.approx(-np.pi / 2.0, abs=0.05)
@@ -111,11 +77,13 @@ def test_signs_and_zeros_are_told_by_gravity(tree: Tree, run: Run):
     assert signals["wrist"].offset == 0.0
 
 
-def test_a_servo_in_ticks_has_its_unit_and_stiffness(tree: Tree, run: Run):
+def test_a_servo_in_ticks_has_its_unit_and_stiffness(moving_arm: MovingArm):
     stiffness = np.array([30.0, 60.0, 30.0, 5.0])
-    positions, goals = (np.round(2048.0 + TICKS * each) for each in (run.q, run.q + run.u / stiffness))
+    positions, goals = (
+        np.round(2048.0 + TICKS * each) for each in (moving_arm.q, moving_arm.q + moving_arm.u / stiffness)
+    )
     names = [*(f"present_position_{k}" for k in range(1, 5)), *(f"goal_position_{k}" for k in range(1, 5))]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([positions, goals]))])
+    setup = set_up(moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([positions, goals]))])
     for k, joint in enumerate(JOINTS):
         assert setup.drives[joint].kind == "position"
         assert setup.drives[joint].kp == pytest.approx(stiffness[k], rel=0.15)
@@ -124,18 +92,21 @@ def test_a_servo_in_ticks_has_its_unit_and_stiffness(tree: Tree, run: Run):
             assert setup.signals[name].offset == pytest.approx(-np.pi)
 
 
-def test_currents_get_the_gain_of_each_drive(tree: Tree, run: Run):
+@pytest.mark.slow
+def test_currents_get_the_gain_of_each_drive(moving_arm: MovingArm):
     constants = np.array([2.1, 2.1, 0.9, 0.9])  # N m per A
     names = [*JOINTS, *(f"current_{joint}" for joint in JOINTS)]
-    setup = set_up(tree, {}, [log_of(run, names, np.hstack([run.q, run.u / constants]))])
+    setup = set_up(
+        moving_arm.tree, {}, [log_of(moving_arm, names, np.hstack([moving_arm.q, moving_arm.u / constants]))]
+    )
     gains = [setup.drives[joint].gain for joint in JOINTS]
     np.testing.assert_allclose(gains, constants, rtol=0.15)
     assert "shoulder.gain" in setup.uncertainty
 
 
-def test_a_joint_without_a_column_is_named(tree: Tree, run: Run):
+def test_a_joint_without_a_column_is_named(moving_arm: MovingArm):
     with pytest.raises(InputError, match=r"position of joint wrist.*task\.locked"):
-        set_up(tree, {}, [log_of(run, ["pan", "shoulder", "elbow"], run.q[:, :3])])
+        set_up(moving_arm.tree, {}, [log_of(moving_arm, ["pan", "shoulder", "elbow"], moving_arm.q[:, :3])])
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def target_unit(target: np.ndarray, position: np.ndarray, own: Measure, *, slide
         own: What the position itself is logged in.
         slides: Whether the joint slides.
     """
-    slope, start = _line(target, position)
+    slope, start = line(target, position)
     spread = float(np.var(position))
     if spread == 0.0 or np.var(position - slope * target - start) > (1.0 - FOLLOWS) * spread:
         return None
@@ -69,7 +69,7 @@ def follows(target: np.ndarray, position: np.ndarray) -> bool:
 
     A torque against gravity resembles the position too, but hardly in the ratio of two units.
     """
-    slope, start = _line(target, position)
+    slope, start = line(target, position)
     spread = float(np.var(position))
     if spread == 0.0 or np.var(position - slope * target - start) > (1.0 - FOLLOWS_CLOSELY) * spread:
         return False
@@ -124,7 +124,8 @@ def held_rows(command: np.ndarray) -> int:
     return max(1, int(np.median(np.diff(changes))))
 
 
-def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope and start of the straight line through points (x, y) of least squares in y."""
     spread = float(np.var(x))
     slope = float(np.mean((x - x.mean()) * (y - y.mean()))) / spread if spread else 0.0
     return slope, float(y.mean() - slope * x.mean())
