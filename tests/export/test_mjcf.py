@@ -89,8 +89,11 @@ OWNERS = """<mujoco>
       </body>
     </body>
   </worldbody>
-  <actuator><motor name="m1" joint="shoulder" gear="2"/><position name="m2" joint="elbow" kp="12" kv="0.5"/></actuator>
-  <keyframe><key name="home" qpos="0.1 0.2"/></keyframe>
+  <actuator>
+    <motor name="m1" joint="shoulder" gear="2" armature="0.002" damping="0.01"/>
+    <position name="m2" joint="elbow" kp="12" kv="0.5"/>
+  </actuator>
+  <keyframe><key name="home" qpos="0.1 0.2" ctrl="0.3 0.4"/></keyframe>
 </mujoco>"""
 
 
@@ -187,6 +190,35 @@ def test_the_owners_file_is_kept_but_for_what_the_model_changes(owners: Path):
     assert after.qpos_spring[0] == pytest.approx(0.3, abs=1e-6)
     start = np.array([0.1, 0.2, 0.0, 0.0])
     ours, theirs = motions(model, start)
+    np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-3)
+
+
+def test_what_an_actuator_adds_to_its_joint_stays(owners: Path):
+    """The motor of the shoulder has an inertia and a damping of its own, through its gear."""
+    model = read_model(owners / "model.yaml")
+    assert model.value("shoulder.armature") == pytest.approx(0.008)
+    assert model.value("shoulder.damping") == pytest.approx(0.09)
+    effects = {
+        "actuator_shoulder/lag": {"tau": 0.01},
+        "shoulder/rotor_inertia": {"J": 0.003},
+        "shoulder/stribeck": {"F_c": 0.05, "F_s": 0.06, "v_s": 0.5},
+        "elbow/viscous": {"sigma": 0.02},
+    }
+    changed = model.with_effects(effects)
+    file = export_mjcf(changed)
+    assert file.source is not None
+    ours, theirs = motions(changed, np.array([0.1, 0.2, 0.0, 0.0]))
+    np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-3)
+
+
+def test_joints_that_are_locked_at_zero_leave_the_file(owners: Path):
+    (owners / "robot.yaml").write_text("plant: robot\nmodel: arm.xml\nlocked: {elbow: 0.0}\n", encoding="utf-8")
+    model = read_robot(owners / "robot.yaml").model.with_effects({"shoulder/viscous": {"sigma": 0.1}})
+    file = export_mjcf(model)
+    assert (file.source, file.note) == (owners / "arm.xml", "")
+    assert (file.model.njnt, file.model.nu, file.model.nkey) == (1, 1, 1)
+    assert file.model.key_qpos.tolist() == [[0.1]]
+    ours, theirs = motions(model, np.array([0.4, 0.0]))
     np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-3)
 
 

@@ -69,6 +69,7 @@ def test_a_locked_joint_joins_its_links(tmp_path: Path):
             "shoulder and wrist are coupled",
         ),
         (ARM.replace('damping="0.1"', 'stiffness="3"'), "joint shoulder has a spring"),
+        (ARM.replace('damping="0.1"', 'damping="0.1 0.2"'), "joint shoulder has damping beyond the linear"),
         ("<mujoco><worldbody/></mujoco>", "no joint"),
         ("joints: 3", "expected an MJCF or URDF file"),
         (ARM.replace(BODY, "", 1).replace(BODY, ""), "body upper moves and has no mass"),

@@ -78,14 +78,21 @@ class FileWorld(MujocoWorld):
         """See `World`."""
         super().load(model, exchange, lanes)
         self.exchange = exchange
-        links = zip(mechanism(model).tree.links, self.order, strict=True)
-        lacking = [link.armature - float(self.model.dof_armature[dof]) for link, dof in links]
-        exchange.lanes.rotor[exchange.joints] = np.array(lacking)[:, None]
+        armature = np.array([link.armature for link in mechanism(model).tree.links])
+        exchange.lanes.rotor[exchange.joints] = (armature - self._armature(model.plant.joints))[:, None]
         self.inputs = [self._input(model, joint) for joint in self.left_on.drives]
 
     def compiled(self, model: Model) -> Any:
         """The file without what the laws do."""
         return without_laws(self.mujoco, self.whole, model.plant.joints, self.left_on)
+
+    def _armature(self, joints: tuple[str, ...]) -> np.ndarray:
+        """What the file gives the joints and what its actuators add to it, shape (joints,)."""
+        found = self.model.dof_armature[self.order].astype(float)
+        for j, joint in enumerate(joints):
+            for i in actuators_of(self.mujoco, self.model, joint):
+                found[j] += self.model.actuator_armature[i] * self.model.actuator_gear[i, 0] ** 2
+        return found
 
     def _input(self, model: Model, joint: str) -> tuple[int, int, float]:
         """Number of a joint among the model's, place of its actuator's input, and gain of its command."""

@@ -66,7 +66,7 @@ def export_mjcf(model: Model, step: float | None = None) -> ExportedFile:
         InputError: MuJoCo is not installed, or a link is no rigid body.
     """
     mujoco = mujoco_module()
-    check_possible(model, "mujoco")
+    check_possible(model, "task=export", "")
     found, owner = mechanism(model), owner_file(model, mujoco)
     note = owner.note
     if owner.spec is not None:

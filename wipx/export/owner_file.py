@@ -63,18 +63,10 @@ def owner_file(model: Model, mujoco: Any) -> OwnerFile:
 
 def _lock(mujoco: Any, spec: Any, joints: tuple[str, ...]) -> None:
     """Fix joints at zero: they go, with their actuators, their sensors and their places in keyframes."""
-    if not joints:
-        return
-    compiled = spec.compile()
-    places = [int(compiled.joint(name).qposadr[0]) for name in joints]
-    rates = [int(compiled.joint(name).dofadr[0]) for name in joints]
+    if joints:
+        spec.compile()  # keyframes of a compiled specification follow what is deleted
     in_joint, joint_type = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtObj.mjOBJ_JOINT
-    idle = [i for i, each in enumerate(spec.actuators) if each.trntype == in_joint and each.target in joints]
-    for key in spec.keys:
-        for name, gone in (("qpos", places), ("qvel", rates), ("ctrl", idle)):
-            values = np.array(getattr(key, name))
-            setattr(key, name, np.delete(values, gone) if len(values) else values)
-    for each in [spec.actuators[i] for i in idle]:
+    for each in [one for one in spec.actuators if one.trntype == in_joint and one.target in joints]:
         spec.delete(each)
     for each in [sensor for sensor in spec.sensors if sensor.objtype == joint_type and sensor.objname in joints]:
         spec.delete(each)

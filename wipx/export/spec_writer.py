@@ -81,10 +81,11 @@ class SpecWriter:
     def _joint(self, name: str, terms: JointTerms) -> None:
         joint, link = self.spec.joint(name), self.links[name]
         file = None if self.model.plant.tree is None else self.model.plant.tree.links[self._number(name)]
-        if not self.own or file is None or link.armature != file.armature:
-            joint.armature = link.armature
-        if not self.own or file is None or terms.damping != (file.damping, 0.0):
-            joint.damping = [*terms.damping, 0.0]
+        if not self.own or file is None:
+            joint.armature, joint.damping = link.armature, [*terms.damping, 0.0]
+        else:  # actuators of the file may have a part in both
+            joint.armature += link.armature - file.armature
+            joint.damping = [joint.damping[0] + terms.damping[0] - file.damping, terms.damping[1], 0.0]
         if not self.own or file is None or terms.friction != file.friction:
             joint.frictionloss = terms.friction
             joint.solref_friction, joint.solimp_friction = [2.0 * self.step, 1.0], list(STIFF)
@@ -123,14 +124,18 @@ class SpecWriter:
             return
         if actuator is None:
             actuator = self._added(terms.command, terms.joint)
+        gear = float(actuator.gear[0])
         if terms.is_motor:
             self._motor(actuator, terms)
         else:
             self._plain(actuator, terms)
+        same = (gear / float(actuator.gear[0])) ** 2  # what the actuator adds to its joint stays
+        actuator.armature, actuator.damping = actuator.armature * same, [actuator.damping[0] * same, 0.0, 0.0]
         if clamped(terms.inputs):
             actuator.ctrlrange, actuator.ctrllimited = finite(terms.inputs), True
         if terms.damping:
-            actuator.damping = [terms.damping / float(actuator.gear[0]) ** 2, 0.0, 0.0]
+            more = terms.damping / float(actuator.gear[0]) ** 2
+            actuator.damping = [actuator.damping[0] + more, 0.0, 0.0]
         if terms.delay:
             actuator.delay, actuator.nsample = terms.delay, int(np.ceil(terms.delay / self.step - 1e-9)) + 1
             actuator.interp = 1  # linear: what a command that is held over a step amounts to when it is late

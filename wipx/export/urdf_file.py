@@ -41,7 +41,7 @@ def export_urdf(model: Model, step: float | None = None) -> ExportedFile:
     Raises:
         InputError: MuJoCo, which judges it, is not installed, or a link is no rigid body.
     """
-    check_possible(model, "mujoco")
+    check_possible(model, "task=export", "")
     found = mechanism(model)
     turn = _down(found.tree.gravity)
     found = _upright(found, turn)

@@ -146,7 +146,13 @@ def _refuse(model: Any, path: Path) -> None:
         name = model.joint(j).name
         if not name:
             raise InputError(f"{path}: a joint of body {model.body(model.jnt_bodyid[j]).name} has no name; give it one")
-        if np.any(model.jnt_stiffness[j] != 0.0):
+        dof = int(model.jnt_dofadr[j])
+        if np.any(model.dof_dampingpoly[dof] != 0.0):
+            raise InputError(
+                f"{path}: joint {name} has damping beyond the linear coefficient; "
+                f"remove that and add the effect {name}/quadratic_drag instead"
+            )
+        if np.any(model.jnt_stiffness[j] != 0.0) or np.any(model.jnt_stiffnesspoly[j] != 0.0):
             raise InputError(f"{path}: joint {name} has a spring; remove it and add the effect {name}/spring instead")
     if np.any(model.body_gravcomp != 0.0):
         body = model.body(int(np.argmax(model.body_gravcomp != 0.0))).name
@@ -194,8 +200,8 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
                 inertia=inertia,
                 body_rotation=turn.T @ own,
                 body_place=turn.T @ (data.xpos[body] - origin),
-                armature=float(model.dof_armature[dof]),
-                damping=float(np.ravel(model.dof_damping[dof])[0]),
+                armature=float(model.dof_armature[dof]) + _of_drives(mujoco, model, j, model.actuator_armature),
+                damping=float(model.dof_damping[dof]) + _of_drives(mujoco, model, j, model.actuator_damping),
                 friction=float(model.dof_frictionloss[dof]),
                 limits=(float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1])) if limited else None,
                 effort=effort,
@@ -206,6 +212,13 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
     _check_masses(tree, path)
     check_names(tree, path)
     return tree
+
+
+def _of_drives(mujoco: Any, model: Any, j: int, values: np.ndarray) -> float:
+    """What the actuators of joint j add to its armature or damping, through their gears."""
+    in_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    own = in_joint & (model.actuator_trnid[:, 0] == j)
+    return float(np.sum(np.ravel(values)[own] * model.actuator_gear[own, 0] ** 2))
 
 
 def _body_name(model: Any, j: int, body: int, moving: bool) -> str:

@@ -62,45 +62,46 @@ def mechanism(model: Model) -> Mechanism:
     )
 
 
-def check_possible(model: Model, engine: str) -> None:
+def check_possible(model: Model, who: str, otherwise: str) -> None:
     """Refuse what is no rigid body.
 
     Args:
         model: To be simulated.
-        engine: As `sim=` names it.
+        who: Cannot do it, e.g. "sim=mujoco".
+        otherwise: What to do where the number is right, e.g. ", or use sim=analytic".
 
     Raises:
         InputError: a mass is negative, or an inertia is that of no body.
     """
     if model.plant.tree is not None:
         for link in mechanism(model).tree.links:
-            _check_link(link, engine)
+            _check_link(link, who, otherwise)
         return
     for name in ("geometry/payload", f"geometry/{EVENT}"):
         mass = value(model, name, "mass", 0.0)
         if mass < 0.0:
             raise InputError(
-                f"sim={engine} cannot do {name} with mass = {mass:g} kg, expected none or more; "
-                f"lower body_mass instead, or use sim=analytic"
+                f"{who} cannot do {name} with mass = {mass:g} kg, expected none or more; "
+                f"lower body_mass instead{otherwise}"
             )
     for link in mechanism(model).tree.links if model.plant.kind == "double_pendulum" else ():
         lacking = -float(link.inertia[0, 0])
         if lacking > 0.0:
             raise InputError(
-                f"sim={engine} cannot do a double_pendulum whose {link.body} is lighter to turn than a point mass "
-                f"({link.body}_inertia lacks {lacking:g} kg m^2); correct {link.body}_inertia or use sim=analytic"
+                f"{who} cannot do a double_pendulum whose {link.body} is lighter to turn than a point mass "
+                f"({link.body}_inertia lacks {lacking:g} kg m^2); correct {link.body}_inertia{otherwise}"
             )
 
 
-def _check_link(link: Link, engine: str) -> None:
+def _check_link(link: Link, who: str, otherwise: str) -> None:
     """Refuse a link of a robot from a model file that is no rigid body."""
     least, middle, most = np.linalg.eigvalsh(link.inertia)
     allowed = ROUNDED * max(most, LEAST)
     if link.mass < 0.0 or least < -allowed or least + middle < most - allowed:
         raise InputError(
-            f"sim={engine} cannot do link {link.body} with a mass of {link.mass:g} kg and moments of inertia of "
+            f"{who} cannot do link {link.body} with a mass of {link.mass:g} kg and moments of inertia of "
             f"{least:.3g}, {middle:.3g} and {most:.3g} kg m^2, which no rigid body has; correct {link.body}.mass, "
-            f"{link.body}.inertia or link_{link.body}/payload, or use sim=analytic"
+            f"{link.body}.inertia or link_{link.body}/payload{otherwise}"
         )
 
 

@@ -14,7 +14,7 @@ from wipx.sim.inputs import Inputs
 from wipx.sim.mechanism import EVENT, check_possible
 from wipx.sim.mjcf import mjcf
 from wipx.sim.simulator import Path, Rollouts
-from wipx.sim.stepped import SteppedSimulator, World, single
+from wipx.sim.stepped import ANALYTIC, SteppedSimulator, World, single
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class MujocoSimulator(SteppedSimulator):
         if path is not None or not mujoco_batch.serves(batch, inputs, initial, self.step):
             return super().replay(batch, inputs, initial, path)
         for p in range(batch.size):
-            check_possible(single(batch, p), self.name)
+            check_possible(single(batch, p), f"sim={self.name}", ANALYTIC)
         return mujoco_batch.replay(engine(), batch, inputs, initial, self.step)
 
 

@@ -24,6 +24,8 @@ from wipx.sim.mechanism import check_possible
 from wipx.sim.rows import W
 from wipx.sim.simulator import Path, Rollouts, StateFeedback
 
+ANALYTIC = ", or use sim=analytic"  # which does what is no rigid body too
+
 
 class World(Protocol):
     """An engine that moves rigid bodies; it holds one model at a time, in up to `W` lanes."""
@@ -164,7 +166,7 @@ class _Run:
         self.simulator = simulator
         self.models = [single(batch, p) for p in range(batch.size)]
         for model in self.models:
-            check_possible(model, simulator.name)
+            check_possible(model, f"sim={simulator.name}", ANALYTIC)
         self.inputs = inputs
         self.layout = Layout(batch.model.plant, batch.size, inputs)
         self.coefficients = coefficients(batch, simulator.smoothing)
