@@ -41,7 +41,7 @@ ALLOWED_IN = {
     "mujoco": {"sim", "baselines", "export"},
     "torch": {"learn", "baselines"},
     "lightning": {"learn"},
-    "onnx": {"learn"},
+    "onnx": {"learn", "tracking"},
     "onnxruntime": {"learn"},
     "osqp": {"control"},
     "pysindy": {"baselines"},

@@ -73,7 +73,8 @@ def test_the_run_is_logged(program, folder, tmp_path: Path):
     assert status == "FINISHED"
     assert parameters["seed"] == "0"
     assert any("least_squares" in value for value in parameters.values())
-    assert {"fit/nominal/theta", "fit/completed/theta", "parameter/pitch/coulomb.F_c"} <= set(figures)
+    assert {"fit/nominal/theta in rad", "fit/completed/theta in rad"} <= set(figures)
+    assert "parameter/pitch/coulomb.F_c in N m" in figures
     artifacts = {path.name for path in (tmp_path / "tracked").rglob("*")}
     assert {"model.yaml", "metrics.json", "report.html", "fit.png"} <= artifacts
 

@@ -6,11 +6,14 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
+import onnx
 import pytest
+from mlflow import MlflowClient
+from mlflow.models import get_model_info
 
 from wipx.core.errors import InputError
 from wipx.tracking.mlflow_store import LONGEST_PARAMETER, MlflowTracking, NoTracking, valid_name
-from wipx.tracking.run_note import LOGGED, RunNote, write_run_note
+from wipx.tracking.run_note import LOGGED, DataNote, RunNote, write_run_note
 
 LOG_ONE_RUN = """
 import sys
@@ -23,7 +26,15 @@ MlflowTracking(sys.argv[1]).log(Path(sys.argv[2]))
 def noted(folder: Path, name: str = "r", **content) -> Path:
     """A folder with the note of a run."""
     folder.mkdir(parents=True, exist_ok=True)
-    given = {"started": 10.0, "ended": 75.0, "in_sweep": False, "parameters": {}, "metrics": {}, **content}
+    given = {
+        "started": 10.0,
+        "ended": 75.0,
+        "in_sweep": False,
+        "parameters": {},
+        "metrics": {},
+        "experiment": "study",
+        **content,
+    }
     write_run_note(folder, RunNote(name, **given))
     return folder
 
@@ -59,7 +70,7 @@ def test_a_run_is_logged_with_all_it_has(tmp_path: Path):
         tags={"task": "identify"},
     )
     (out / "report.html").write_text("<p>")
-    MlflowTracking(str(folder), experiment="study").log(out)
+    MlflowTracking(str(folder)).log(out)
 
     assert rows(folder, "select name, status, end_time - start_time from runs") == [("first", "FINISHED", 65_000)]
     assert rows(folder, "select name from experiments where name = 'study'") == [("study",)]
@@ -102,12 +113,44 @@ def test_jobs_of_a_sweep_stand_under_one_run_that_takes_what_was_made_of_them(tm
         tracking.log(noted(sweep / name, name, in_sweep=True))
     tracking.log_sweep(sweep, {"best": 0.5}, [table])
 
-    parents = rows(tmp_path / "runs", "select run_uuid from runs where name = 'ablation/quick'")
+    parents = rows(tmp_path / "runs", "select run_uuid from runs where name = 'all of quick'")
     assert len(parents) == 1
+    assert rows(tmp_path / "runs", "select start_time, end_time from runs where name = 'all of quick'") == [
+        (10_000, 75_000)
+    ]
     children = rows(tmp_path / "runs", "select value from tags where key = 'mlflow.parentRunId'")
     assert children == parents * 2
     assert rows(tmp_path / "runs", "select value from metrics where key = 'best'") == [(0.5,)]
     assert [path.name for path in (tmp_path / "runs" / "mlartifacts").rglob("*.md")] == ["table.md"]
+
+
+def estimator(path: Path) -> str:
+    """An ONNX graph from windows of 30 samples to pitches; returns the file's name."""
+    windows = onnx.helper.make_tensor_value_info("windows", onnx.TensorProto.FLOAT, ["robots", 30, 2])
+    pitch = onnx.helper.make_tensor_value_info("pitch", onnx.TensorProto.FLOAT, ["robots"])
+    node = onnx.helper.make_node("ReduceMean", ["windows"], ["pitch"], axes=[1, 2], keepdims=0)
+    graph = onnx.helper.make_graph([node], "mean", [windows], [pitch])
+    onnx.save(onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 13)], ir_version=8), path)
+    return path.name
+
+
+def test_data_are_inputs_of_a_run_and_its_estimator_is_registered_with_its_signature(tmp_path: Path):
+    data = DataNote("trials", "runs/trials/1a2b", "1a2b", "training")
+    out = noted(tmp_path / "out", data=[data], models={"pitch-cnn1d-30": "estimator.onnx"})
+    estimator(out / "estimator.onnx")
+    tracking = MlflowTracking(str(tmp_path / "runs"))
+    tracking.log(out)
+    (out / LOGGED).unlink()
+    tracking.log(out)  # as after a kill: nothing twice
+
+    assert rows(tmp_path / "runs", "select name, digest from datasets") == [("trials", "1a2b")]
+    assert rows(tmp_path / "runs", "select count(*) from inputs") == [(1,)]
+    assert rows(tmp_path / "runs", "select name, version from model_versions") == [("pitch-cnn1d-30", 1)]
+    client = MlflowClient(f"sqlite:///{tmp_path / 'runs' / 'mlflow.db'}")
+    place = client.get_model_version_download_uri("pitch-cnn1d-30", "1")
+    signature = get_model_info(place.removeprefix("file://")).signature
+    assert signature.inputs.to_dict()[0]["tensor-spec"]["shape"] == (-1, 30, 2)
+    assert signature.outputs.input_names() == ["pitch"]
 
 
 def test_a_sweep_whose_database_was_removed_gets_a_new_run(tmp_path: Path):

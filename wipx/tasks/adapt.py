@@ -8,6 +8,7 @@ import numpy as np
 from wipx.core.adaptation import AdaptationResult
 from wipx.core.errors import check_positive
 from wipx.core.model import Model
+from wipx.core.plant import Plant
 from wipx.identify.adaptation import AdaptationProblem, Adapted
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
@@ -15,10 +16,11 @@ from wipx.report.numbers import significant
 from wipx.tasks.files.adaptation import plain_adaptation, write_trajectories
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import log_run, note_run, parameter_metrics, recorded_data
 from wipx.tasks.shared.adapted import adaptation_problem, adapted_simulation, loaded_trials
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.trials import TrialPlan, trials_of
+from wipx.tracking.run_note import DataNote
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Adapt:
         result = _result(job, source, adapted, problem)
         with written_together(job.out) as folder:
             _write(job, folder, result, adapted.models[0])
-            _note(job, folder, result)
+            data = recorded_data(source, problem.trials.recordings, "adaptation")
+            _note(job, folder, result, problem.nominal.plant, data)
         log_run(job)
         print(_summary(result))
 
@@ -99,15 +102,16 @@ def _summary(result: AdaptationResult) -> str:
     return "\n".join(lines)
 
 
-def _note(job: Job, folder: Path, result: AdaptationResult) -> None:
+def _note(job: Job, folder: Path, result: AdaptationResult, plant: Plant, data: DataNote) -> None:
     losses = {"fit": result.fit, "heldout": result.held_out}
     figures = {f"{part}/loss": loss.value for part, loss in losses.items() if loss is not None}
     figures |= {f"{part}/floor": loss.floor for part, loss in losses.items() if loss is not None}
-    figures |= {f"parameter/{name}": value for name, value in result.parameters.items()}
+    figures |= parameter_metrics(result.parameters, plant)
     history, histories = result.history, {}
     if history is not None:
         histories["search/best_loss"] = np.column_stack([history.evaluations, history.best_loss])
-        figures |= {"search/evaluations": float(history.evaluations[-1]), "search/seconds": float(history.seconds[-1])}
+        figures["search/evaluations"] = float(history.evaluations[-1])
+        figures["search/time in s"] = float(history.seconds[-1])
     note_run(
         job,
         folder,
@@ -115,4 +119,5 @@ def _note(job: Job, folder: Path, result: AdaptationResult) -> None:
         metrics=figures,
         histories=histories,
         tags={"method": result.method, "optimizer": result.optimizer, "engine": result.engine, "target": result.target},
+        data=[data],
     )

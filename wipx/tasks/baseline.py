@@ -19,8 +19,9 @@ from wipx.identify.windows import check_long_enough
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.files.results import write_json, written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import error_metrics, log_run, note_run, parameter_metrics, recorded_data
 from wipx.tasks.shared.job import Job
+from wipx.tracking.run_note import DataNote
 
 NETWORK = "residual.npz"
 
@@ -51,7 +52,7 @@ class RunBaseline:
             write_model(answer.model, folder / "model.yaml")
             if answer.network is not None:
                 answer.network.write(folder / NETWORK)
-            _note(job, folder, source.name, answer, errors, seconds)
+            _note(job, folder, recorded_data(source, recordings, "diagnosis"), answer, errors, seconds)
         log_run(job)
         named = ", ".join(found.name for found in answer.found) or "nothing by name"
         print(f"{content['verdict']}: {named}; {seconds:.1f} s; written to {job.out}")
@@ -135,13 +136,11 @@ def _effect(found: Found, effect: Effect, plant: Plant, share: float) -> Mapping
     }
 
 
-def _note(job: Job, folder: Path, title: str, answer: Answer, errors: FitErrors, seconds: float) -> None:
-    figures = {
-        f"fit/{model}/{column}": value
-        for model in ("nominal", "completed", "noise_floor")
-        for column, value in getattr(errors, model).items()
-    }
-    figures |= {f"parameter/{f.name}.{symbol}": v for f in answer.found for symbol, v in f.parameters.items()}
-    figures["seconds"] = seconds
-    tags = {"plant": answer.model.plant.kind, "verdict": "mismatch" if answer.mismatch else "consistent"}
-    note_run(job, folder, title, metrics=figures, tags=tags)
+def _note(job: Job, folder: Path, data: DataNote, answer: Answer, errors: FitErrors, seconds: float) -> None:
+    plant = answer.model.plant
+    figures = error_metrics({"fit": errors}, plant)
+    figures |= parameter_metrics({f"{f.name}.{s}": v for f in answer.found for s, v in f.parameters.items()}, plant)
+    figures["baseline/time in s"] = seconds
+    named = ", ".join(found.name for found in answer.found) or "none"
+    tags = {"plant": plant.kind, "verdict": "mismatch" if answer.mismatch else "consistent", "effects": named}
+    note_run(job, folder, data.name, metrics=figures, tags=tags, data=[data])

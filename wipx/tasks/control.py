@@ -21,7 +21,7 @@ from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.control import plain_control, write_courses
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import log_run, note_run, training_data
 from wipx.tasks.shared.control_metrics import TrialJudge
 from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioName
 from wipx.tasks.shared.job import Job
@@ -91,7 +91,7 @@ class Control:
             trials = self._trials(target, self.loop(job, controller, robots, folder))
             result = self._result(job, robots, target, trials, estimates=controller.asks_estimator)
             _write(job, folder, result)
-            _note(job, folder, result)
+            _note(job, folder, result, robots.training.card)
         log_run(job)
         print(_summary(result))
 
@@ -209,22 +209,27 @@ def _summary(result: ControlResult) -> str:
     return "\n".join(lines)
 
 
-def _note(job: Job, folder: Path, result: ControlResult) -> None:
+def _note(job: Job, folder: Path, result: ControlResult, card: Mapping[str, Any]) -> None:
     trials = result.trials
     figures = {
-        "failures": float(result.failures),
-        "gap": result.gap,
-        "rmse/x": float(np.mean([trial.rmse_x for trial in trials])),
-        "rmse/pitch": float(np.mean([trial.rmse_pitch for trial in trials])),
-        "rmse/target": float(np.mean([trial.rmse_target for trial in trials])),
+        "trials stopped": float(result.failures),
+        "reality gap": result.gap,
+        "rmse/position in m": float(np.mean([trial.rmse_x for trial in trials])),
+        "rmse/pitch from balance in rad": float(np.mean([trial.rmse_pitch for trial in trials])),
+        "rmse/pitch from target in rad": float(np.mean([trial.rmse_target for trial in trials])),
     }
     errors = [trial.estimate - trial.pitch for trial in trials if trial.estimate is not None]
+    times = [trial.recovery for trial in trials if trial.recovery is not None]
+    figures["trials recovered"] = float(len(times))
+    if times:
+        figures["recovery/median time in s"] = float(np.median(times))
     if errors:
-        figures["estimate/rmse"] = float(np.sqrt(np.mean(np.square(errors))))
+        figures["estimate/rmse in rad"] = float(np.sqrt(np.mean(np.square(errors))))
     note_run(
         job,
         folder,
         f"{result.controller} {result.scenario} {result.method} seed {result.seed}",
         metrics=figures,
         tags={"controller": result.controller, "scenario": result.scenario, "method": result.method},
+        data=[training_data(card)],
     )

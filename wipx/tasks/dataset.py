@@ -237,8 +237,8 @@ def _summary(training: TrainingSet, path: Path, seconds: float) -> str:
 
 def _note(job: Job, folder: Path, training: TrainingSet) -> None:
     card: Any = training.card
-    figures = {f"label_check/{key}": float(value) for key, value in card["label_check"].items()}
-    figures |= {"stopped": float(card["stopped"]), "gap/fit": float(card["gap"]["value"])}
+    figures = {_check_metric(key): float(value) for key, value in card["label_check"].items()}
+    figures |= {"robots stopped": float(card["stopped"]), "reality gap": float(card["gap"]["value"])}
     note_run(
         job,
         folder,
@@ -246,3 +246,7 @@ def _note(job: Job, folder: Path, training: TrainingSet) -> None:
         metrics=figures,
         tags={"method": str(card["method"]), "engine": str(card["engine"]), "training_set": str(card["name"])},
     )
+
+
+def _check_metric(key: str) -> str:
+    return f"label check/{key}" if key == "robots" else f"label check/{key.replace('_', ' ')} in rad"

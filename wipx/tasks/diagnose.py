@@ -15,9 +15,10 @@ from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.files.results import write_csv, write_json, written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import error_metrics, log_run, note_run, parameter_metrics, recorded_data
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
+from wipx.tracking.run_note import DataNote
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Diagnose:
             )
         with written_together(job.out) as folder:
             write_diagnosis(diagnosis, folder)
-            _note(job, folder, diagnosis)
+            _note(job, folder, diagnosis, recorded_data(source, recordings, "diagnosis"))
         log_run(job)
         print(summary(diagnosis))
         print(f"\npage: {job.out / 'report.html'}")
@@ -88,16 +89,12 @@ def write_diagnosis(diagnosis: Diagnosis, folder: Path) -> None:
         write_csv(folder / "next_experiment.csv", diagnosis.next_experiment.reference)
 
 
-def _note(job: Job, folder: Path, diagnosis: Diagnosis) -> None:
-    errors = {"fit": diagnosis.fit, "heldout": diagnosis.held_out}
-    figures = {
-        f"{part}/{model}/{column}": value
-        for part, e in errors.items()
-        for model in ("nominal", "completed", "noise_floor")
-        for column, value in getattr(e, model).items()
-    }
-    figures |= {f"parameter/{p.name}": p.value for effect in diagnosis.effects for p in effect.parameters}
-    figures |= {f"evidence/{effect.name}": effect.log_evidence_gain for effect in diagnosis.effects}
-    figures["seconds"] = diagnosis.seconds
-    tags = {"plant": diagnosis.nominal.plant.kind, "source": diagnosis.source, "verdict": diagnosis.verdict}
-    note_run(job, folder, diagnosis.title, metrics=figures, tags=tags)
+def _note(job: Job, folder: Path, diagnosis: Diagnosis, data: DataNote) -> None:
+    plant = diagnosis.nominal.plant
+    figures = error_metrics({"fit": diagnosis.fit, "heldout": diagnosis.held_out}, plant)
+    figures |= parameter_metrics({p.name: p.value for effect in diagnosis.effects for p in effect.parameters}, plant)
+    figures |= {f"evidence/{effect.name} in nats": effect.log_evidence_gain for effect in diagnosis.effects}
+    figures |= {"effects found": float(len(diagnosis.effects)), "diagnosis/time in s": diagnosis.seconds}
+    named = ", ".join(effect.name for effect in diagnosis.effects) or "none"
+    tags = {"plant": plant.kind, "source": diagnosis.source, "verdict": diagnosis.verdict, "effects": named}
+    note_run(job, folder, data.name, metrics=figures, tags=tags, data=[data])

@@ -8,6 +8,7 @@ import numpy as np
 
 from wipx.core.errors import check_positive
 from wipx.core.model import Model
+from wipx.core.plant import Plant
 from wipx.core.recording import RecordingSplit
 from wipx.core.results import FitErrors, IdentificationResult
 from wipx.effects.catalogue import effect_of
@@ -20,9 +21,10 @@ from wipx.recordings.robot_file import RobotDescription
 from wipx.recordings.source import RecordingSource
 from wipx.report.tables import summary
 from wipx.tasks.files.results import write_csv, write_json, written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import error_metrics, in_unit, log_run, note_run, recorded_data
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import SearchProgress
+from wipx.tracking.run_note import DataNote
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,8 @@ class Identify:
         result = _result(source, split, request.nominal, found, objective)
         with written_together(job.out) as folder:
             _write(folder, result, found, request.nominal)
-            _note(job, folder, result)
+            data = recorded_data(source, recordings, "identification")
+            _note(job, folder, result, request.nominal.plant, data)
         log_run(job)
         print(summary(result))
         print(f"\npage: {job.out / 'report.html'}")
@@ -164,22 +167,17 @@ def _errors(errors: FitErrors) -> Mapping[str, object]:
     return {name: kept[name] for name in ("nominal", "completed", "noise_floor", "windows")}
 
 
-def _note(job: Job, folder: Path, result: IdentificationResult) -> None:
-    errors = {"fit": result.fit, "heldout": result.held_out}
-    figures = {
-        f"{part}/{model}/{column}": value
-        for part, e in errors.items()
-        if e is not None
-        for model in ("nominal", "completed", "noise_floor")
-        for column, value in getattr(e, model).items()
-    }
-    figures |= {f"parameter/{e.name}": e.value for e in result.estimates}
+def _note(job: Job, folder: Path, result: IdentificationResult, plant: Plant, data: DataNote) -> None:
+    figures = error_metrics({"fit": result.fit, "heldout": result.held_out}, plant)
+    figures |= {in_unit(f"parameter/{e.name}", e.unit): e.value for e in result.estimates}
     history = result.history
+    figures["search/time in s"] = float(history.seconds[-1])
     note_run(
         job,
         folder,
-        result.title,
+        data.name,
         metrics=figures,
         histories={"search/best_loss": np.column_stack([history.evaluations, history.best_loss])},
-        tags={"plant": result.plant, "source": result.source},
+        tags={"plant": result.plant, "source": result.source, "effects": ", ".join(n for n, *_ in result.effects)},
+        data=[data],
     )

@@ -21,7 +21,7 @@ from wipx.tasks.control import Control
 from wipx.tasks.dataset import Dataset, training_set_of
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import log_run, note_run, training_data
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 
@@ -76,7 +76,7 @@ class ControllerMargins:
                 )
             write_model(robots.model, folder / "model.yaml")
             _write(job, folder, found, region)
-            _note(job, folder, found, region)
+            _note(job, folder, found, region, robots.training.card)
         log_run(job)
         print(f"{_summary(found, region)}: {job.out / 'table.md'}")
 
@@ -139,16 +139,24 @@ def _summary(found: Mapping[str, Margins], region: RecoveryRegion) -> str:
     )
 
 
-def _note(job: Job, folder: Path, found: Mapping[str, Margins], region: RecoveryRegion) -> None:
+def _note(
+    job: Job, folder: Path, found: Mapping[str, Margins], region: RecoveryRegion, card: Mapping[str, Any]
+) -> None:
     figures = {}
     for name, one in found.items():
-        figures |= {f"{name}/{key}": float(value) for key, value in asdict(one).items() if np.isfinite(value)}
-        figures[f"{name}/recovered"] = region.controllers[name].share
+        figures |= {
+            f"{name}/gain down to": one.gain_low,
+            f"{name}/gain up to": one.gain_high,
+            f"{name}/phase in deg": float(np.rad2deg(one.phase)),
+            f"{name}/delay in ms": 1e3 * one.delay,
+            f"{name}/loads recovered in per cent": 100.0 * region.controllers[name].share,
+        }
     method = str(job.chosen.get("method"))
     note_run(
         job,
         folder,
         f"margins {method} seed {job.seed}",
-        metrics=figures,
+        metrics={name: value for name, value in figures.items() if np.isfinite(value)},
         tags={"method": method, "target": str(job.chosen.get("target"))},
+        data=[training_data(card)],
     )

@@ -1,6 +1,7 @@
 """`task=train`: make an estimator of the equilibrium pitch in simulation, judge it there and on a robot."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +18,14 @@ from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.estimation import plain_estimation
 from wipx.tasks.files.finished import finish, finished
 from wipx.tasks.files.results import written_together
-from wipx.tasks.files.tracked import log_run, note_run
+from wipx.tasks.files.tracked import log_run, note_run, recorded_data, training_data
 from wipx.tasks.shared.adapted import loaded_trials
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 from wipx.tasks.shared.trials import trials_of
+from wipx.tracking.run_note import DataNote
 
+NETWORK = "estimator.onnx"  # where an estimator leaves its graph
 TIMED = 200  # estimates of one window each, of which the median time is taken
 
 
@@ -53,12 +56,14 @@ class Train:
                 "give task.dataset.length=... for longer windows"
             )
         robots = training_set_of(job, settings)
-        trials = loaded_trials(trials_of(job, replace(settings.plan(), seed=self.judged_seed)))
+        source = trials_of(job, replace(settings.plan(), seed=self.judged_seed))
+        trials = loaded_trials(source)
         with written_together(job.out) as folder:
             result = self._result(job, robots, trials, folder)
             _draw(result, folder)
             finish(job, folder, plain_estimation(result))
-            _note(job, folder, result)
+            judged_by = recorded_data(source, trials.recordings, "judgement")
+            _note(job, folder, result, [training_data(robots.training.card), judged_by])
         log_run(job)
         print(_summary(result))
 
@@ -122,14 +127,20 @@ def _summary(result: EstimationResult) -> str:
     return "\n".join([*lines, f"  one estimate takes {significant(1e3 * result.latency)} ms"])
 
 
-def _note(job: Job, folder: Path, result: EstimationResult) -> None:
-    figures = {"latency_s": result.latency, "seconds": result.seconds}
+def _note(job: Job, folder: Path, result: EstimationResult, data: Sequence[DataNote]) -> None:
+    figures = {"estimate/time in ms": 1e3 * result.latency, "training/time in s": result.seconds}
     for name, judged in (("sim", result.simulated), ("real", result.recorded)):
-        figures |= {f"{name}/rmse": judged.rmse, f"{name}/mse": judged.mse, f"{name}/coverage": judged.coverage}
+        figures |= {
+            f"{name}/rmse in rad": judged.rmse,
+            f"{name}/mse in rad2": judged.mse,
+            f"{name}/coverage of 90 per cent": judged.coverage,
+        }
     note_run(
         job,
         folder,
         f"{result.method} {result.estimator} {result.length} seed {result.seed}",
         metrics=figures,
         tags={"method": result.method, "estimator": result.estimator, "target": result.target},
+        data=data,
+        models={f"pitch-{result.estimator}-{result.length}": NETWORK} if (folder / NETWORK).is_file() else None,
     )

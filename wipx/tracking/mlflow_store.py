@@ -1,9 +1,10 @@
-"""Logging of finished runs to MLflow; the only module that imports mlflow."""
+"""Logging of finished runs to MLflow."""
 
 import logging
 import os
 import re
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,8 +14,9 @@ from typing import TYPE_CHECKING
 
 from wipx.core.errors import InputError
 from wipx.core.locked import locked
+from wipx.tracking.inputs_and_models import log_inputs, log_models
 from wipx.tracking.reach import SQLITE, check_reachable
-from wipx.tracking.run_note import LogNote, RunNote, read_log_note, read_run_note, write_log_note
+from wipx.tracking.run_note import RUN, LogNote, RunNote, read_log_note, read_run_note, write_log_note
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -27,6 +29,7 @@ METRICS_IN_BATCH = 1000
 PARAMETERS_IN_BATCH = 100
 KEY = "wipx_key"  # tag by which a run is found again
 LOCK = ".logging.lock"
+RUNS_FIRST = {"mlflow.experimentKind": "custom_model_development"}  # MLflow opens such an experiment on its runs
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,11 @@ class MlflowTracking:
         folder: Holds mlflow.db and mlartifacts/, the database and the files, where no `uri` is given.
         uri: Address of a tracking server or database, as MLflow takes it; None for the database in `folder`.
         later: Whether runs are kept in their folders only, until task=log_runs logs them.
-        experiment: Name under which MLflow lists the runs.
     """
 
     folder: str = "runs"
     uri: str | None = None
     later: bool = False
-    experiment: str = "wipx"
 
     @property
     def store(self) -> str:
@@ -101,7 +102,8 @@ class MlflowTracking:
         note = read_run_note(out)
         if self.store in read_log_note(out, note.key).runs:
             return False
-        with self._opened() as (client, experiment), locked(out / LOCK):
+        with self._opened() as client, locked(out / LOCK):
+            experiment = self._experiment(client, note.experiment)
             logged = read_log_note(out, note.key)
             if self.store in logged.runs:
                 return False
@@ -113,7 +115,11 @@ class MlflowTracking:
             _log_metrics(client, run_id, note)
             for name in note.artifacts:
                 client.log_artifact(run_id, str(out / name))
+            log_inputs(client, run_id, note.data)
+            log_models(client, run_id, out, note.models)
             client.set_terminated(run_id, "FINISHED", end_time=_ms(note.ended))
+            if note.in_sweep:
+                client.set_terminated(tags["mlflow.parentRunId"], "FINISHED", end_time=_ms(note.ended))
             write_log_note(out, logged.with_run(self.store, run_id))
         return True
 
@@ -128,8 +134,8 @@ class MlflowTracking:
         if self.later:
             return
         try:
-            with self._opened() as (client, experiment):
-                run_id = self._parent(client, experiment, sweep)
+            with self._opened() as client:
+                run_id = self._parent(client, self._experiment(client, _experiment_of(sweep)), sweep)
                 for name, value in metrics.items():
                     client.log_metric(run_id, valid_name(name), value)
                 for path in artifacts:
@@ -146,39 +152,49 @@ class MlflowTracking:
             note: LogNote = read_log_note(sweep, None)
             run_id = _found(client, experiment, note.key)
             if run_id is None:
-                name = f"{sweep.parent.name}/{sweep.name}"
-                run_id = client.create_run(experiment, run_name=name, tags={KEY: note.key}).info.run_id
-            client.set_terminated(run_id)
+                begun, tags = _ms(_begun(sweep)), {KEY: note.key}
+                run_id = client.create_run(
+                    experiment, start_time=begun, run_name=f"all of {sweep.name}", tags=tags
+                ).info.run_id
             write_log_note(sweep, note.with_run(self.store, run_id))
             return run_id
 
     @contextmanager
-    def _opened(self) -> Iterator[tuple["MlflowClient", str]]:
-        """A client of the store, and the experiment's id; what goes wrong with it is an `InputError`."""
+    def _opened(self) -> Iterator["MlflowClient"]:
+        """A client of the store; what goes wrong with it is an `InputError`."""
         check_reachable(self.store)
         client_type = _quiet_client_type()
         from mlflow.exceptions import MlflowException
         from sqlalchemy.exc import SQLAlchemyError
 
         try:
-            client = _client(client_type, self.store, Path(self.folder))
-            yield client, self._experiment(client)
+            yield _client(client_type, self.store, Path(self.folder))
         except (MlflowException, SQLAlchemyError, OSError) as error:
             reason = " ".join(str(error).split())[:300]
             raise InputError(f"tracking store {self.store}: {reason}") from error
 
-    def _experiment(self, client: "MlflowClient") -> str:
-        """The experiment's id; it is made where it does not exist."""
-        found = client.get_experiment_by_name(self.experiment)
+    def _experiment(self, client: "MlflowClient", name: str) -> str:
+        """The id of an experiment; it is made where it does not exist."""
+        found = client.get_experiment_by_name(name)
         if found is not None:
             return found.experiment_id
         folder = Path(self.folder)
         with locked(folder / LOCK):
-            found = client.get_experiment_by_name(self.experiment)
+            found = client.get_experiment_by_name(name)
             if found is not None:
                 return found.experiment_id
             place = None if self.uri is not None else (folder.resolve() / "mlartifacts").as_uri()
-            return client.create_experiment(self.experiment, artifact_location=place)
+            return client.create_experiment(name, artifact_location=place, tags=RUNS_FIRST)
+
+
+def _begun(sweep: Path) -> float:
+    """Start of the first of a sweep's finished jobs [s since the epoch]."""
+    return min((read_run_note(path.parent).started for path in sweep.glob(f"*/{RUN}")), default=time.time())
+
+
+def _experiment_of(sweep: Path) -> str:
+    """The experiment of a sweep's jobs; that of the folder's name where none has finished."""
+    return next((read_run_note(path.parent).experiment for path in sweep.glob(f"*/{RUN}")), sweep.name)
 
 
 _CLIENTS: dict[str, "MlflowClient"] = {}

@@ -17,11 +17,29 @@ LOGGED = ".mlflow.json"  # where it was logged
 
 
 @dataclass(frozen=True)
+class DataNote:
+    """A data set that a run has read.
+
+    Attributes:
+        name: Shown beside the run.
+        source: Its file or folder.
+        digest: Short name of its content.
+        context: What it was used for.
+    """
+
+    name: str
+    source: str
+    digest: str
+    context: str
+
+
+@dataclass(frozen=True)
 class RunNote:
     """What MLflow shows of a run.
 
     Attributes:
         name: Shown in the list of runs.
+        experiment: Under which it is listed.
         started: Time at which the run began [s since the epoch].
         ended: Time at which its results were complete [s since the epoch].
         in_sweep: Whether it is a job of a sweep, whose folder is the parent of the run's.
@@ -30,10 +48,14 @@ class RunNote:
         histories: Course of numbers by name, rows of (step, value).
         artifacts: Names of files in the run's folder.
         tags: Texts by name.
+        data: What it has read.
+        models: Names of files in the run's folder that hold estimators as ONNX graphs, by the name under which MLflow
+            registers them.
         key: Of this run alone; MLflow has it as a tag, so that no run is logged twice.
     """
 
     name: str
+    experiment: str
     started: float
     ended: float
     in_sweep: bool
@@ -42,6 +64,8 @@ class RunNote:
     histories: Mapping[str, list[list[float | None]]] = field(default_factory=dict)
     artifacts: list[str] = field(default_factory=list)
     tags: Mapping[str, str] = field(default_factory=dict)
+    data: list[DataNote] = field(default_factory=list)
+    models: Mapping[str, str] = field(default_factory=dict)
     key: str = field(default_factory=lambda: uuid.uuid4().hex)
 
 
@@ -76,10 +100,11 @@ def read_run_note(folder: Path) -> RunNote:
     path = folder / RUN
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return RunNote(**{key: value for key, value in content.items() if key != "schema"})
+        del content["schema"]
+        return RunNote(**{**content, "data": [DataNote(**data) for data in content["data"]]})
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}; nothing was noted of this run, run it again") from error
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, KeyError) as error:
         raise InputError(f"{path}: no note of a run ({error}); remove the folder and run it again") from error
 
 
