@@ -16,12 +16,23 @@ import numpy as np
 
 from wipx.core.errors import InputError, unknown_name
 from wipx.importing.formats.columns import columns_of_array
+from wipx.importing.formats.message_fields import LONGEST
 from wipx.importing.log_format import CHUNK_ROWS, Chunk, LogFormat, Loss, Wanted, nanoseconds, package, unstamped
 
 STREAM = "arrays"
 HDF5 = (".h5", ".hdf5")
 MOST_ROWS = 1000  # for each byte of the file: arrays of zeros are packed that much, and no more
-DAMAGED = (OSError, ValueError, KeyError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error, MemoryError)
+DAMAGED = (
+    OSError,
+    ValueError,
+    KeyError,
+    RuntimeError,
+    TypeError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    MemoryError,
+)
 Slice = Callable[[int, int], np.ndarray]
 
 
@@ -62,9 +73,9 @@ class ArrayLog(LogFormat):
                     try:
                         array = file[name]
                     except DAMAGED as error:
-                        yield Loss(str(path), f"array {name} is damaged ({type(error).__name__})", 1)
+                        yield _damaged(str(path), name, error)
                         continue
-                    if array.ndim:
+                    if isinstance(array, np.ndarray) and array.ndim:
                         arrays[name] = _Array(array.shape, lambda begin, end, a=array: a[begin:end])
         except DAMAGED as error:
             raise InputError(f"{path}: not a readable NPZ file ({error}); check the file") from error
@@ -74,35 +85,49 @@ class ArrayLog(LogFormat):
         h5py = package("h5py", str(path))
         try:
             file = h5py.File(path, "r")
-        except OSError as error:
+        except DAMAGED as error:
             raise InputError(f"{path}: not a readable HDF5 file ({error}); check the file") from error
         with file:
             groups = self._groups(path, file)
-            for number, (label, group) in enumerate(groups):
+            for number, name in enumerate(groups):
+                label, where = name.rpartition("/")[2], f"{path} {name}".strip()
                 arrays: dict[str, _Array] = {}
+                damaged: list[str] = []
                 try:
-                    group.visititems(lambda name, item, into=arrays: _collect(h5py, name, item, into))
+                    group = file[name] if name else file
+                    for member in _members(group):
+                        try:
+                            _collect(h5py, member, group[member], arrays)
+                        except DAMAGED as error:
+                            damaged.append(member)
+                            yield _damaged(where, member, error)
                 except DAMAGED as error:
-                    yield Loss(f"{path} {label}".strip(), f"the group is damaged ({error})", 1)
-                yield from self._episode(path, label, arrays, number / len(groups))
+                    yield _damaged(where, "its list of arrays", error)
+                    continue
+                if self.time not in damaged:
+                    yield from self._episode(path, label, arrays, number / len(groups))
 
-    def _groups(self, path: Path, file: Any) -> list[tuple[str, Any]]:
+    def _groups(self, path: Path, file: Any) -> list[str]:
+        """Names of the groups that are episodes, in order; "" is the file itself."""
         if self.episodes is None:
-            return [("", file)]
-        names: list[str] = []
-        depth = self.episodes.strip("/").count("/")
+            return [""]
         pattern = self.episodes.strip("/")
         try:
-            file.visit(lambda name: names.append(name) if name.count("/") == depth and fnmatch(name, pattern) else None)
+            names = _members(file)
         except DAMAGED as error:
             raise InputError(f"{path}: the file's groups cannot be read ({error}); nothing of it can be had") from error
-        if not names:
-            raise InputError(f"{path}: no group matches log.format.episodes={self.episodes}; it has {_listed(file)}")
-        return [(name.rpartition("/")[2], file[name]) for name in sorted(names, key=_natural)]
+        found = [name for name in names if name.count("/") == pattern.count("/") and fnmatch(name, pattern)]
+        if not found:
+            more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+            listed = ", ".join(names[:8]) + more
+            raise InputError(f"{path}: no group matches log.format.episodes={self.episodes}; it has {listed}")
+        return sorted(found, key=_natural)
 
     def _episode(self, path: Path, label: str, arrays: "Mapping[str, _Array]", done: float) -> Iterator[Chunk | Loss]:
         """One trajectory in pieces; arrays of another length than the time are said to be left out."""
         where = f"{path} {label}".strip()
+        # Images are no numbers of a robot.
+        arrays = {name: array for name, array in arrays.items() if np.prod(array.shape[1:]) <= LONGEST}
         rows = self._rows(path, where, arrays)
         other = sorted(name for name, array in arrays.items() if array.shape[0] != rows)
         if other:
@@ -146,19 +171,22 @@ class _Array:
     rows: Slice
 
 
+def _members(group: Any) -> list[str]:
+    """Names of all groups and arrays below a group."""
+    names: list[str] = []
+    group.visit(names.append)
+    return names
+
+
 def _collect(h5py: Any, name: str, item: Any, into: dict[str, _Array]) -> None:
-    # No branch returns a value: one would end the visit.
     if isinstance(item, h5py.Dataset) and item.shape and item.dtype.kind in "biuf":
         into[name] = _Array(item.shape, lambda begin, end: item[begin:end])
+
+
+def _damaged(where: str, name: str, error: Exception) -> Loss:
+    return Loss(where, f"array {name} is damaged ({type(error).__name__})", 1)
 
 
 def _natural(name: str) -> list[Any]:
     """So that demo_2 comes before demo_10."""
     return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", name)]
-
-
-def _listed(file: Any) -> str:
-    names: list[str] = []
-    file.visit(names.append)
-    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-    return ", ".join(names[:8]) + more
