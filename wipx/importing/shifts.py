@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import correlate
 
 from wipx.core.log_preview import ShiftEstimate
 from wipx.importing.mapping import is_command
@@ -21,6 +22,7 @@ FEWEST = 500  # rows
 WIDTHS = (1.0, 2.0, 4.0, 8.0, 16.0)  # rows; standard deviation of the smoothing, the sharpest that is clear counts
 CLEAR = 0.95  # correlation that is clear
 LEAST = 0.8  # correlation under which nothing is said
+LEFT = 1e-9  # share of a command's power that the rest must leave: less is rounding
 SLOW = 0.05  # standard deviations of the speed under which dry friction changes its sign smoothly
 Column = Callable[[str], np.ndarray]
 
@@ -126,12 +128,17 @@ def _lag(
     if size <= 1e-9 * float(np.linalg.norm(followed[rows])) or float(np.ptp(u)) == 0.0:
         return 0.0, 0.0
     lags = np.arange(-before, after + 1)
-    correlations = np.zeros(len(lags))
-    for k, lag in enumerate(lags):
-        moved = u[rows - lag] - basis @ (basis.T @ u[rows - lag])
-        norm = float(np.linalg.norm(moved))
-        # A command that the rest explains but for rounding explains nothing.
-        correlations[k] = abs(moved @ rest) / (norm * size) if norm > 1e-6 * np.linalg.norm(u[rows - lag]) else 0.0
+    near = u[margin : len(u) - margin]
+
+    def at_lags(signal: np.ndarray) -> np.ndarray:
+        """Products of a signal with the command at all lags, shape (lags,)."""
+        return correlate(near, signal, mode="valid", method="fft")[::-1]
+
+    # What the rest explains of a command is its part along the basis.
+    power = correlate(near**2, np.ones(len(rows)), mode="valid", method="fft")[::-1]
+    left = power - np.sum([at_lags(column) ** 2 for column in basis.T], axis=0)
+    told = left > LEFT * np.max(power)
+    correlations = np.where(told, np.abs(at_lags(rest)) / (np.sqrt(np.where(told, left, 1.0)) * size), 0.0)
     best = int(np.argmax(correlations))
     return float(lags[best]) + _vertex(correlations**2, best), float(correlations[best])
 
