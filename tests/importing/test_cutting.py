@@ -75,6 +75,18 @@ def test_a_joint_that_sticks_under_a_changing_command_is_no_pause(imported, tmp_
     assert frozen.frozen_at == pytest.approx(motion.t[300], abs=0.05)
 
 
+def test_a_robot_that_balances_in_the_noise_of_its_sensor_does_not_pause(imported, tmp_path: Path, fresh_seed: int):
+    motion = with_pause(logs.motion(np.random.default_rng(0), 1200), 400, 800)
+    noise = 1e-3 * np.random.default_rng(fresh_seed).normal(size=motion.positions.shape)
+    measured = motion.positions + noise
+    idle = replace(motion, positions=measured)
+    log = imported(logs.write_npz(tmp_path / "a.npz", idle), "mujoco", rename=NUMBERS)
+    assert len(log.recordings) == 2
+    balancing = replace(idle, commands=motion.commands - 20.0 * noise)
+    log = imported(logs.write_npz(tmp_path / "b.npz", balancing), "mujoco", rename=NUMBERS)
+    assert len(log.recordings) == 1
+
+
 def test_a_gap_divides_a_log(imported, tmp_path: Path):
     motion = logs.motion(np.random.default_rng(0), 600)
     kept = np.concatenate([np.arange(250), np.arange(300, 600)])

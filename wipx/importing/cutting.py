@@ -16,6 +16,7 @@ IRREGULAR = 3.0  # where the 95 % step is so many usual ones, messages come when
 REST = 0.5  # [s] over which a signal must stay still
 KEPT_REST = 0.5  # [s] of a pause that a recording keeps on either side: friction shows when motion begins and ends
 STILL_SHARE = 1e-3  # of the span of a signal, by which it may move at rest
+STILL_MOST = 0.1  # of the span, at most
 STILL_STEPS = 4.0  # steps of its resolution, likewise
 NEARLY_WHOLE = 1e-3  # by which a change may miss a multiple of the resolution, as a share of it
 MOSTLY = 0.95  # of the changes must be multiples
@@ -125,16 +126,17 @@ def at_rest(merged: MergedEpisode) -> np.ndarray:
     names = [name for name in merged.names if is_position(name) or is_command(name)]
     still = np.full(len(merged.t), bool(names))
     for name in names:
-        still &= is_still(merged.t, merged.column(name))
+        still &= is_still(merged.t, merged.column(name), measured=not is_command(name))
     return still
 
 
-def is_still(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+def is_still(t: np.ndarray, values: np.ndarray, *, measured: bool) -> np.ndarray:
     """Whether a signal stays where it is around a row, shape (rows,).
 
     Args:
         t: Times of the rows, shape (rows,) [s].
         values: The signal, shape (rows,); rows where it is not known are still.
+        measured: Whether it has noise; a command that trembles is one of a controller at work.
     """
     known = np.isfinite(values)
     if len(t) < 3 or not known.any():
@@ -142,17 +144,20 @@ def is_still(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     window = max(3, round(REST / float(np.median(np.diff(t)))))
     filled = np.interp(t, t[known], values[known])
     moved = maximum_filter1d(filled, window) - minimum_filter1d(filled, window)
-    return moved <= still_within(filled)
+    return moved <= still_within(filled, measured=measured)
 
 
-def still_within(values: np.ndarray) -> float:
+def still_within(values: np.ndarray, *, measured: bool) -> float:
     """By how much a signal may move at rest.
 
     Args:
         values: The signal, shape (rows,).
+        measured: Whether it has noise.
     """
     noise = float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / np.sqrt(6.0) if len(values) > 2 else 0.0
-    return max(STILL_SHARE * float(np.ptp(values)), STILL_STEPS * resolution(values), STILL_NOISE * noise)
+    span = float(np.ptp(values))
+    tolerance = max(STILL_SHARE * span, STILL_STEPS * resolution(values), STILL_NOISE * noise if measured else 0.0)
+    return min(tolerance, STILL_MOST * span)
 
 
 def resolution(values: np.ndarray) -> float:

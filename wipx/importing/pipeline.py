@@ -12,7 +12,7 @@ from wipx.importing.checks import column_summary, longest_constant, trace, unuse
 from wipx.importing.clock import Clock, check_not_set_back, choose_clock, set_back
 from wipx.importing.cutting import Interruption, Stretch, at_rest, cut, gaps, is_still, pauses, stops
 from wipx.importing.log_format import Chunk, Loss
-from wipx.importing.mapping import LogMapping, MappedColumn, mapped_columns, mapped_stops, witnesses
+from wipx.importing.mapping import LogMapping, MappedColumn, is_command, mapped_columns, mapped_stops, witnesses
 from wipx.importing.merge import Episode, MergedEpisode, episode
 from wipx.importing.shifts import estimate_shifts
 from wipx.importing.spool import Spool, StoredStream
@@ -252,7 +252,7 @@ def _should_move(name: str, merged: MergedEpisode) -> np.ndarray:
     moving = np.zeros(len(merged.t), dtype=bool)
     for witness in witnesses(name):
         if witness in merged.names:
-            moving |= ~is_still(merged.t, merged.column(witness))
+            moving |= ~is_still(merged.t, merged.column(witness), measured=not is_command(witness))
     return moving
 
 

@@ -140,13 +140,18 @@ def _lag(
     told = left > LEFT * np.max(power)
     correlations = np.where(told, np.abs(at_lags(rest)) / (np.sqrt(np.where(told, left, 1.0)) * size), 0.0)
     best = int(np.argmax(correlations))
+    if best in (0, len(lags) - 1):  # it rises beyond what is looked at: no shift, but another cause
+        return 0.0, 0.0
     return float(lags[best]) + _vertex(correlations**2, best), float(correlations[best])
 
 
 def _vertex(values: np.ndarray, best: int) -> float:
-    """Where a parabola through the greatest value and its neighbours has its top, counted from that value."""
-    if best in (0, len(values) - 1):
-        return 0.0
+    """Where a parabola through the greatest value and its neighbours has its top, counted from that value.
+
+    Args:
+        values: Shape (n,).
+        best: Neither the first nor the last.
+    """
     left, middle, right = values[best - 1 : best + 2]
     curvature = left - 2.0 * middle + right
     return float(0.5 * (left - right) / curvature) if curvature < 0.0 else 0.0
