@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-bounds check docs bench lock clean
+.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -84,7 +84,13 @@ test-fresh: $(READY)  ## run the tests on fresh random numbers, statistical clai
 	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow" --seed=$(or $(SEED),fresh)
 
 test-slow: $(READY)  ## run the slow tests
-	$(PY) -m pytest -q -m slow
+	$(PY) -m pytest -q -m "slow and not kill and not launchers"
+
+test-kill: $(READY)  ## disturb a sweep at 20 random moments, start it again, and compare it with an undisturbed one
+	$(PY) -m pytest -q -m kill --seed=$(or $(SEED),0)
+
+test-launchers: $(READY)  ## compare the launchers' results (Slurm needs Debian's slurmctld, slurmd, munge; Ray wipx[ray])
+	$(PY) -m pytest -q -m launchers -rs
 
 test-bounds: $(READY)  ## run the tests with compiled code that checks its indices (slow)
 	$(ONE_THREAD) NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q -n auto -m "not slow"
