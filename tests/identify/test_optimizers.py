@@ -34,6 +34,8 @@ class CurvedValley:
     lost: list[int] = field(default_factory=list, compare=False)
     valleys: int = 2
     differences: int = 2
+    near: bool = False
+    short: None = None
 
     @property
     def space(self) -> ParameterSpace:
@@ -185,6 +187,8 @@ class Bowl:
 
     valleys: int = 1
     differences: int = 1
+    near: bool = False
+    short: None = None
 
     @property
     def space(self) -> ParameterSpace:

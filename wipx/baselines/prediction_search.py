@@ -31,7 +31,8 @@ class CorrectedPredictor(Predictor):
 
     Attributes:
         initial: The nominal model's states, shape (2 joints, R).
-        gain: Correction per error of the known rows, shape (2 joints, K' + 1, joints, R) [1, 1/s].
+        gain: Correction per error of the known rows, of the rows from the first known one on,
+            shape (2 joints, rows, joints, R) [1, 1/s].
         seen: The windows up to the last known row.
     """
 
@@ -44,20 +45,20 @@ class CorrectedPredictor(Predictor):
         """For the windows of a predictor."""
         batch = ModelBatch(nominal)
         state = predictor.predict(batch).initial
-        residuals, slopes = predictor.state_gain(batch, state)
+        _, slopes = predictor.state_gain(batch, state)
         inverse = np.linalg.inv(slopes.normal[0])
-        gain = -np.einsum("rab,bkjr->akjr", inverse, slopes.slopes[:, :, :, 0], optimize=True)
+        gain = -np.einsum("rab,rbkj->akjr", inverse, slopes.slopes[0], optimize=True)
         gain = gain / predictor.noise[:, None]
         windows = predictor.windows
         last = len(windows.known) - 1 - np.argmax(windows.known[::-1], axis=0)
         seen = windows.inputs.until(last)
-        return cls(predictor.simulator, windows, predictor.noise, state[:, 0], gain[:, : len(residuals)], seen)
+        return cls(predictor.simulator, windows, predictor.noise, state[:, 0], gain, seen)
 
     def predict(self, batch: ModelBatch, near: np.ndarray | None = None, *, floor: bool = False) -> Prediction:
         """Correct the states, then predict; `near` and `floor` have no meaning here."""
         state = np.repeat(self.initial[:, None, :], batch.size, axis=1)
         shown = self.simulator.replay(batch, self.seen, state).coordinates
-        residuals = self.residuals(shown, self.windows.known) * self.noise[:, None, None]
+        residuals = self.residuals(shown, self.windows.known)[self.known_from :] * self.noise[:, None, None]
         state = state + np.einsum("akjr,kjpr->apr", self.gain, residuals, optimize=True)
         return Prediction(state, self.simulator.replay(batch, self.windows.inputs, state).coordinates, None)
 

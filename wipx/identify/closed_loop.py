@@ -84,6 +84,16 @@ class ClosedLoopProblem:
         return 16
 
     @property
+    def near(self) -> bool:
+        """Nobody knows."""
+        return False
+
+    @property
+    def short(self) -> None:
+        """None: a trajectory is one window."""
+        return None
+
+    @property
     def differences(self) -> int:
         """One: they are forward."""
         return 1

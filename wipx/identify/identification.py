@@ -146,7 +146,7 @@ def _weighed_anew(
         return problem, minimum
     start = problem.space.to_values(minimum.cube)
     free = tuple(replace(p, start=float(v)) for p, v in zip(problem.space.free, start, strict=True))
-    weighed = replace(weighed, space=replace(problem.space, free=free))
+    weighed = replace(weighed, space=replace(problem.space, free=free), near=True, short=None)
     again = optimizer.minimise(weighed, rng, watcher)
     return weighed, replace(again, history=_joined(minimum.history, again.history))
 

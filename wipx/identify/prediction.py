@@ -97,7 +97,7 @@ class Predictor:
         if len(settled) == 2:  # each window takes the better of both
             first = settled[0].cost <= settled[1].cost
             state = np.where(first, state, settled[1].state)
-            gain = StateGain(np.where(first, gain.slopes, settled[1].gain.slopes), gain.steps)
+            gain = gain.where(first, settled[1].gain)
         rollouts = self.simulator.replay(batch, self.windows.inputs, state)
         spread = self._floor(batch, state, gain) if floor else None
         return Prediction(state, rollouts.coordinates, spread)
@@ -125,15 +125,16 @@ class Predictor:
             return self
         return replace(self, simulator=self.simulator.smoothed(tuple((100.0 * self.noise).tolist())))
 
-    def residuals(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    def residuals(self, coordinates: np.ndarray, rows: np.ndarray, begin: int = 0) -> np.ndarray:
         """Recorded minus predicted in standard deviations of the noise, zero outside of `rows`.
 
         Args:
             coordinates: Shape (K + 1, joints, P, R), or fewer rows.
             rows: Which rows count, shape (K + 1, R).
+            begin: Row of the windows with which they begin.
         """
         n = len(coordinates)
-        scaled = self.windows.recorded[:n, :, None, :] - coordinates
+        scaled = self.windows.recorded[begin : begin + n, :, None, :] - coordinates
         largest = self._largest[:, None, None]
         np.fmin(scaled, largest, out=scaled)  # also where it is not a number
         np.fmax(scaled, -largest, out=scaled)
@@ -150,7 +151,7 @@ class Predictor:
             reach: Known rows later than this after the first do not count [s].
 
         Returns:
-            Residuals, shape (K' + 1, joints, P, R), and the linearisation.
+            Residuals of the rows from the first known one on, shape (rows, joints, P, R), and the linearisation.
         """
         w = self.windows
         known = w.known & self._within(reach)
@@ -161,25 +162,37 @@ class Predictor:
         tiled = np.concatenate([state, *(state + _unit(steps, i) for i in range(n))], axis=1)
         values = None if batch.values is None else np.tile(batch.values, (n + 1, 1))
         wide = ModelBatch(batch.model, names, values if values is not None else np.zeros((n + 1, 0)))
-        out = self.simulator.replay(wide, inputs, tiled).coordinates
-        every = self.residuals(out, known).reshape(out.shape[0], out.shape[1], n + 1, size, w.count)
+        every = self._residuals_seen(self.simulator.replay(wide, inputs, tiled).coordinates, known)
+        every = every.reshape(*every.shape[:2], n + 1, size, w.count)
         residuals = every[:, :, 0]
-        slopes = np.stack([(every[:, :, 1 + i] - residuals) / steps[i] for i in range(n)])
-        return residuals, StateGain(slopes, steps)
+        slopes = every[:, :, 1:] - residuals[:, :, None]
+        slopes /= steps[:, None, None]
+        return residuals, StateGain(np.ascontiguousarray(np.transpose(slopes, (3, 4, 2, 0, 1))), steps)
+
+    def _residuals_seen(self, coordinates: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """As `residuals`, of the rows from the first known one on."""
+        return self.residuals(coordinates[self.known_from :], rows[self.known_from :], self.known_from)
+
+    @cached_property
+    def known_from(self) -> int:
+        """The first row that any window knows."""
+        return int(np.argmax(self.windows.known.any(axis=1)))
 
     def correction(self, gain: "StateGain", residuals: np.ndarray, damping: np.ndarray | float = 0.0) -> np.ndarray:
         """Change of the state that the residuals of the known rows ask for, shape (2 joints, P, R).
 
         Args:
-            gain: Linearisation at the state.
-            residuals: Of the known rows there.
+            gain: Linearisation at the state, of P models or of one for all.
+            residuals: Of the known rows there, shape (rows, joints, P, R).
             damping: Levenberg-Marquardt damping of each window, shape (P, R).
         """
-        right = np.einsum("akjpr,kjpr->pra", gain.slopes, residuals, optimize=True)
-        normal = gain.normal
-        diagonal = np.einsum("praa->pra", normal) * np.asarray(damping)[..., None]
-        normal = normal + diagonal[..., None] * np.eye(normal.shape[-1])
-        return -np.moveaxis(np.linalg.solve(normal, right[..., None])[..., 0], -1, 0)
+        rows, joints, size, windows = residuals.shape
+        models = len(gain.slopes)
+        right = np.transpose(residuals.reshape(rows, joints, models, -1, windows), (2, 4, 0, 1, 3))
+        right = gain.flat @ right.reshape(models, windows, rows * joints, -1)
+        diagonal = np.einsum("praa->pra", gain.normal) * np.asarray(damping)[..., None]
+        normal = gain.normal + diagonal[..., None] * np.eye(gain.normal.shape[-1])
+        return -np.transpose(np.linalg.solve(normal, right), (2, 0, 3, 1)).reshape(-1, size, windows)
 
     def _settle(self, batch: ModelBatch, state: np.ndarray) -> "Settled":
         """Levenberg-Marquardt steps on all known rows; a window keeps the best state it had."""
@@ -195,7 +208,7 @@ class Predictor:
             settled |= np.abs(cost - trial_cost) <= SETTLED * cost
             state = np.where(better, trial, state)
             residuals = np.where(better, trial_residuals, residuals)
-            gain = StateGain(np.where(better, trial_gain.slopes, gain.slopes), gain.steps)
+            gain = trial_gain.where(better, gain)
             cost = np.where(better, trial_cost, cost)
             damping = np.where(better, 0.1 * damping, np.maximum(10.0 * damping, 0.1))
             if np.all(settled):
@@ -203,9 +216,9 @@ class Predictor:
         return Settled(state, gain, cost)
 
     def known_residuals(self, batch: ModelBatch, state: np.ndarray) -> np.ndarray:
-        """Residuals of the known rows at a state, shape (K' + 1, joints, P, R)."""
+        """Residuals of the known rows at a state, shape (rows, joints, P, R)."""
         inputs = self.windows.inputs.until(_last_row(self.windows.known))
-        return self.residuals(self.simulator.replay(batch, inputs, state).coordinates, self.windows.known)
+        return self._residuals_seen(self.simulator.replay(batch, inputs, state).coordinates, self.windows.known)
 
     def predicted_residuals(self, batch: ModelBatch, state: np.ndarray) -> np.ndarray:
         """Residuals of the predicted rows at a state, shape (K + 1, joints, P, R)."""
@@ -248,7 +261,7 @@ class StateGain:
     """How the residuals of the known rows depend on the state at the window's first row.
 
     Attributes:
-        slopes: Shape (2 joints, K' + 1, joints, P, R) [1 / unit of the state].
+        slopes: Of the rows from the first known one on, shape (P, R, 2 joints, rows, joints) [1 / unit of the state].
         steps: Size of each state's finite-difference step.
     """
 
@@ -256,14 +269,22 @@ class StateGain:
     steps: np.ndarray
 
     @property
+    def flat(self) -> np.ndarray:
+        """Slopes of all rows and joints side by side, shape (P, R, 2 joints, rows joints)."""
+        return self.slopes.reshape(*self.slopes.shape[:3], -1)
+
+    @cached_property
     def normal(self) -> np.ndarray:
         """Normal matrix, shape (P, R, 2 joints, 2 joints).
 
         A joint that sticks gives no information about its rate; a weak prior of a hundred steps
         keeps the matrix regular.
         """
-        product = np.einsum("akjpr,bkjpr->prab", self.slopes, self.slopes, optimize=True)
-        return product + np.diag((1e-2 / self.steps) ** 2)
+        return self.flat @ np.swapaxes(self.flat, 2, 3) + np.diag((1e-2 / self.steps) ** 2)
+
+    def where(self, mine: np.ndarray, other: "StateGain") -> "StateGain":
+        """This one where `mine` (P, R) is true, else the other."""
+        return StateGain(np.where(mine[:, :, None, None, None], self.slopes, other.slopes), self.steps)
 
 
 @dataclass(frozen=True)

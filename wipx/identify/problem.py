@@ -32,6 +32,16 @@ class Problem(Protocol):
         """Evaluations that `jacobian` takes for each number that varies."""
         ...
 
+    @property
+    def near(self) -> bool:
+        """Whether the start is near the minimum."""
+        ...
+
+    @property
+    def short(self) -> "Problem | None":
+        """The same over windows so short that its loss has hardly more than one minimum; None where there are none."""
+        ...
+
     def smoothed(self, level: float) -> "Problem":
         """The same problem with dry friction smoothed by `level`; 0 for the problem itself."""
         ...
@@ -58,18 +68,22 @@ class WindowProblem:
         predictor: Windows and how to predict them; its `noise` weighs the signals.
         speeds: What each joint reaches, shape (joints,) [m/s or rad/s]; measures the smoothing.
         weights: How much each window counts, shape (R,); None for all alike.
+        near: Whether the start is near the minimum.
+        short: The same over shorter windows, from whose minimum a search begins; None for none.
     """
 
     space: ParameterSpace
     predictor: Predictor
     speeds: tuple[float, ...]
     weights: np.ndarray | None = None
+    near: bool = False
+    short: "WindowProblem | None" = None
     _last: list[tuple[np.ndarray, Prediction]] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def valleys(self) -> int:
         """Few: a window is short, and begins where the candidate would have it begin."""
-        return 2
+        return 1 if self.near or self.short else 2
 
     @property
     def differences(self) -> int:
@@ -122,8 +136,7 @@ class WindowProblem:
             batch = self.space.batch(moved[part])
             state = np.repeat(prediction.initial, batch.size, axis=1)
             change = self.predictor.known_residuals(batch, state) - known
-            correction = [self.predictor.correction(gain, change[:, :, [i]]) for i in range(batch.size)]
-            state = state + np.concatenate(correction, axis=1)
+            state = state + self.predictor.correction(gain, change)
             rows.append(self._flat(self.predictor.predicted_residuals(batch, state)))
         flat = np.concatenate(rows)
         flat = np.concatenate([flat, self.space.prior_residuals(moved)], axis=1)

@@ -19,6 +19,8 @@ from wipx.identify.problem import Problem
 SECANT = 0.02  # finite-difference step relative to the distance from the neutral value
 WIDER = 50.0  # growth of that step with the smoothing: sixteenfold at a smoothing of 0.3
 FEWEST = 2  # starts that are followed to the end, or a quarter of all
+SHORT_SMOOTHING = (0.1, 0.01)  # levels of smoothing for short windows
+NEAR = 0.1  # largest level near the minimum
 BETTER = 0.002  # share by which the loss must fall for the best minimum to be followed again
 
 
@@ -37,7 +39,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """Least squares from the model's own start and from the best of a random sample.
+    """Least squares from the model's own start, or where shorter windows lead to, and from the best of a random sample.
 
     Attributes:
         starts: How many searches are made; None for as many as the problem has `valleys`.
@@ -68,11 +70,13 @@ class LeastSquares:
         The first level of smoothing shows which starts lead to a low minimum; the others are not followed further.
         """
         log = Log("least_squares", self.evaluations, self.seconds, watcher)
-        wide, narrow = self.smoothing[:1], self.smoothing[1:]
         try:
             starts = self._starts(problem, rng, log)
+            wide, narrow = self.smoothing[:1], self.smoothing[1:]
+            if problem.near:
+                wide, narrow = (), tuple(level for level in self.smoothing if level <= NEAR)
             kept = min(max(FEWEST, len(starts) // 4), len(starts))
-            share = 1.0 / (len(starts) + kept * len(narrow))
+            share = 1.0 / (len(starts) * len(wide) + kept * len(narrow))
             reached = [self._follow(problem, start, wide, share, log) for start in starts]
             reached.sort(key=lambda place: place.loss)
             ends = [self._follow(problem, place.cube, narrow, share, log) for place in reached[:kept]]
@@ -84,7 +88,11 @@ class LeastSquares:
 
     def _starts(self, problem: Problem, rng: np.random.Generator, log: Log) -> np.ndarray:
         own = np.stack([problem.space.start, problem.space.neutral])
-        log.evaluate(problem, own)
+        if problem.short is not None:
+            own = np.stack([self._brought_near(problem.short, problem.space.start, log), *own])
+            own = own[np.argsort(log.evaluate(problem, own), kind="stable")]
+        else:
+            log.evaluate(problem, own)
         further = (self.starts or problem.valleys) - 1
         if further == 0:
             return own[:1]
@@ -92,6 +100,12 @@ class LeastSquares:
         losses = log.evaluate(problem, cube)
         best = cube[np.argsort(losses, kind="stable")[:further]]
         return np.concatenate([own[:1], best])
+
+    def _brought_near(self, short: Problem, start: np.ndarray, log: Log) -> np.ndarray:
+        """The minimum of short windows."""
+        for level in SHORT_SMOOTHING:
+            start = self._search(short.smoothed(level), start, SECANT * (1.0 + WIDER * level), log)
+        return start
 
     def _follow(
         self, problem: Problem, start: np.ndarray, levels: tuple[float, ...], share: float, log: Log
