@@ -6,6 +6,7 @@ arXiv:1604.00772.
 
 import time
 from dataclasses import dataclass
+from typing import ClassVar
 
 import cma
 import numpy as np
@@ -28,9 +29,11 @@ class AllAtOnce:
     """One search over all effects, and one over those without which the predictions get worse.
 
     Attributes:
-        seconds: Budget of time [s].
+        seconds: Budget of time [s], for each joint of a robot from a model file.
         population: Candidates of a generation.
     """
+
+    of_trees: ClassVar[bool] = True
 
     seconds: float = 15.0
     population: int = 24
@@ -41,17 +44,17 @@ class AllAtOnce:
     def answer(self, case: Problem, rng: np.random.Generator) -> Answer:
         """Search, keep what the predictions need, search again."""
         search = PredictionSearch.of(case)
-        begun = time.monotonic()  # the simulator is compiled by now
+        begun, budget = time.monotonic(), case.budget(self.seconds)  # the simulator is compiled by now
         names = _all_together(case)
         problem = search.problem(names)
-        cube = self._minimise(problem, _undisturbed(problem.space), begun + FIRST_SHARE * self.seconds, rng)
+        cube = self._minimise(problem, _undisturbed(problem.space), begun + FIRST_SHARE * budget, rng)
         kept = needed(problem, cube, names)
         if not kept:
             return Answer(case.nominal, (), mismatch=False)
         lean = search.problem(tuple(kept))
         values = dict(zip(problem.space.names, problem.space.to_values(cube), strict=True))
         start = lean.space.to_cube(np.array([values[name] for name in lean.space.names]))
-        cube = self._minimise(lean, start, begun + self.seconds, rng)
+        cube = self._minimise(lean, start, begun + budget, rng)
         model = at(lean.space, cube)
         weights = needed(lean, cube, kept)
         found = tuple(_named(name, dict(model.effects[name]), weight) for name, weight in weights.items())

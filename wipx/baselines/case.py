@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from wipx.effects.catalogue import effect_of, vocabulary
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
+
+OF_TREES = ("asymmetric_coulomb", "load_friction", "offset", "rotor_inertia")  # contract section 6 has them besides
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,19 @@ class Problem:
         """What each joint reaches, shape (joints,) [m/s or rad/s]."""
         return tuple(self.scales[site].velocity for site in self.nominal.plant.joints)
 
+    def budget(self, seconds: float) -> float:
+        """Time for a search [s]: what a baseline is given, for each joint of a robot from a model file."""
+        return seconds * (1 if self.nominal.plant.tree is None else len(self.nominal.plant.joints))
+
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Effects of contract section 3 that can be added to the owner's model."""
+        """Effects of contract sections 3 and 6 that can be added to the owner's model."""
         plant, present = self.nominal.plant, tuple(self.nominal.effects)
+        beside = OF_TREES if plant.tree is not None else ()
         contract = (
-            name for name, effect in vocabulary(plant).items() if not effect.outside_vocabulary and name not in present
+            name
+            for name, effect in vocabulary(plant).items()
+            if (not effect.outside_vocabulary or effect.kind in beside) and name not in present
         )
         return tuple(name for name in contract if not excluded(name, present, plant))
 
@@ -104,7 +113,13 @@ class Answer:
 
 
 class Baseline(Protocol):
-    """A method that people would use in place of a diagnosis."""
+    """A method that people would use in place of a diagnosis.
+
+    Attributes:
+        of_trees: Whether it can do robots from a model file.
+    """
+
+    of_trees: ClassVar[bool]
 
     @property
     def seconds(self) -> float:

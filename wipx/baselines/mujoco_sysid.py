@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class MujocoSysid:
         seconds: Budget of time [s].
         windows: That are predicted; of more, an even choice.
     """
+
+    of_trees: ClassVar[bool] = False
 
     seconds: float = 10.0
     windows: int = 16

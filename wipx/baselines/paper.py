@@ -7,6 +7,7 @@ the controller's references nor repeated runs.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class PaperFriction:
         c2: Pull towards the swarm's best.
         w: Inertia of a particle's velocity.
     """
+
+    of_trees: ClassVar[bool] = False
 
     seconds: float = 10.0
     particles: int = 50

@@ -7,6 +7,7 @@ the Bayesian information criterion (Schwarz 1978), the rows' colour allowed for.
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ class TorqueRegression:
         seconds: Budget of time [s]; effects found until then are kept.
         effects: Named at most.
     """
+
+    of_trees: ClassVar[bool] = False
 
     seconds: float = 10.0
     effects: int = 4

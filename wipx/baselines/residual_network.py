@@ -8,7 +8,7 @@ extra of this package; predictions need numpy only.
 import importlib
 import time
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class ResidualNetwork:
         seconds: Budget of time [s].
         hidden: Neurons of a layer.
     """
+
+    of_trees: ClassVar[bool] = False
 
     seconds: float = 10.0
     hidden: int = 24

@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pysindy as ps
@@ -40,6 +41,8 @@ class SparseRegression:
         seconds: Budget of time [s]; once it is spent only the largest term is refined.
         terms: Named at most.
     """
+
+    of_trees: ClassVar[bool] = False
 
     seconds: float = 10.0
     terms: int = 4

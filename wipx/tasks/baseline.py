@@ -34,13 +34,16 @@ class RunBaseline:
         """Write diagnosis.json, model.yaml and, of a baseline that learned one, the network."""
         source: RecordingSource = job.part("recordings")
         description = source.describe()
-        if description.model.plant.tree is not None:
-            raise InputError(f"{source.path}: baselines cannot do a robot from a model file yet")
+        baseline: Baseline = job.part("baseline")
+        if description.model.plant.tree is not None and not baseline.of_trees:
+            name = job.chosen.get("baseline", type(baseline).__name__)
+            raise InputError(
+                f"{source.path}: baseline={name} cannot do a robot from a model file yet; use baseline=all_at_once"
+            )
         nominal = job.part("plant").nominal(description.model)
         recordings = source.load()
         check_long_enough(recordings)
         case = Problem(recordings, nominal, description.uncertainty, job.part("sim"))
-        baseline: Baseline = job.part("baseline")
         begun = time.perf_counter()
         answer = baseline.answer(case, np.random.default_rng(job.seed))
         seconds = time.perf_counter() - begun

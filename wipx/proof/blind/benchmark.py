@@ -31,6 +31,7 @@ from wipx.proof.blind.page import write_results
 from wipx.proof.blind_robots.cases import DIRTY_TIERS, TIERS, stratified
 from wipx.proof.blind_robots.folder import RunFolder, read_json
 from wipx.proof.blind_robots.scenario import LENGTHS
+from wipx.proof.blind_robots.trees.cases import TREE_TIERS
 from wipx.tasks.files.results import write_json
 from wipx.tasks.shared.job import Job
 
@@ -69,7 +70,7 @@ class BlindBenchmark:
         seed: Of the draws; None for a fresh one.
         lengths: Shortest and longest time that a recording lasts [s].
         workers: Processes that draw and diagnose.
-        tiers: Tiers to draw from; empty for all of exact robots.
+        tiers: Tiers to draw from; empty for all of exact robots of the five plants.
         baselines: Other methods that diagnose the same recordings, options of the group `baseline`.
         baselines_cases: On how many of the cases; a sample of all tiers.
         time_limit: For one diagnosis [s].
@@ -98,8 +99,8 @@ class BlindBenchmark:
                 f"both from {SHORTEST:g} to {LONGEST:g} s"
             )
         for tier in self.tiers:
-            if tier not in {**TIERS, **DIRTY_TIERS}:
-                raise unknown_name("tier", tier, (*TIERS, *DIRTY_TIERS), "task.tiers")
+            if tier not in {**TIERS, **DIRTY_TIERS, **TREE_TIERS}:
+                raise unknown_name("tier", tier, (*TIERS, *DIRTY_TIERS, *TREE_TIERS), "task.tiers")
 
     def run(self, job: Job) -> None:
         """Diagnose all cases and write the tables and the page."""

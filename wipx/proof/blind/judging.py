@@ -17,6 +17,7 @@ from wipx.proof.blind_robots.dirty_score import DirtyScore
 from wipx.proof.blind_robots.folder import RunFolder, read_json
 from wipx.proof.blind_robots.score import CaseScore, ParameterScore, UnseenErrors, failed, score
 from wipx.proof.blind_robots.seal import Commitment, digest_of_folder, unseal
+from wipx.proof.blind_robots.tree_score import TreeScore
 from wipx.proof.blind_robots.write import write_files
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
@@ -191,4 +192,5 @@ def _score_from(entry: dict[str, Any]) -> CaseScore:
     names = {name: tuple(entry[name]) for name in ("truth", "answer")}
     parameters = tuple(ParameterScore(**one) for one in entry["parameters"])
     dirty = None if entry.get("dirty") is None else DirtyScore(**entry["dirty"])
-    return CaseScore(**{**entry, **names, "parameters": parameters, "dirty": dirty})
+    tree = None if entry.get("tree") is None else TreeScore(**entry["tree"])
+    return CaseScore(**{**entry, **names, "parameters": parameters, "dirty": dirty, "tree": tree})

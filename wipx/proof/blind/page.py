@@ -10,6 +10,7 @@ from wipx.proof.blind.diagnosing import OURS
 from wipx.proof.blind.dirty_page import dirty_row, dirty_sentence, dirty_tables
 from wipx.proof.blind.evidence import FALSE_ALARM_BAR, Account, bar, interval, notes, proof, robots
 from wipx.proof.blind.judging import Opened
+from wipx.proof.blind.tree_page import tree_row, tree_sentence, tree_tables
 from wipx.proof.blind_robots.folder import RunFolder
 from wipx.proof.blind_robots.picture import draw_confusions
 from wipx.proof.blind_robots.score import CaseScore
@@ -85,6 +86,7 @@ def score_page_of(folder: RunFolder, cases: Sequence[Opened], account: Account) 
         methods=_methods(cases),
         groups=(
             *dirty_tables(cases),
+            *tree_tables(cases),
             *_groups("By tier", "", "tier", by_tier(scores)),
             *_groups("By signal to noise", f" {SIGNAL_TO_NOISE}", "signal to noise", by_contrast(scores)),
         ),
@@ -100,6 +102,8 @@ def _headline(scores: Sequence[CaseScore], alarms: Count) -> str:
     hidden = [one for one in scores if one.truth]
     outside = [one for one in scores if one.outside is not None]
     parts = [dirty_sentence(scores)] if any(one.dirty is not None for one in scores) else []
+    if any(one.tree is not None for one in scores):
+        parts.append(tree_sentence(scores))
     if hidden:
         right = group_score("hidden", hidden).exact
         parts.append(f"Physics was hidden in {robots(right.total)} and named exactly in {right.right}.")
@@ -111,7 +115,7 @@ def _headline(scores: Sequence[CaseScore], alarms: Count) -> str:
         parts.append(
             f"In {robots(flagged.total)} it was physics that the vocabulary lacks: {flagged.right} called unexplained."
         )
-    return " ".join(parts)
+    return " ".join(part for part in parts if part)
 
 
 def _tiles(everything: GroupScore, alarms: Count) -> tuple[Tile, ...]:
@@ -324,6 +328,7 @@ def _csv(cases: Sequence[Opened]) -> str:
         row = {name: value for name, value in asdict(one).items() if value is not None}
         row |= {"method": method, "truth": " ".join(one.truth), "answer": " ".join(one.answer)}
         row |= {"dirty": dirty_row(one)} if one.dirty is not None else {}
+        row |= {"tree": tree_row(one)} if one.tree is not None else {}
         row["parameters"] = " ".join(f"{p.name}={p.value:.6g}({p.true:.6g})" for p in one.parameters)
         writer.writerow(row)
     return text.getvalue()

@@ -5,11 +5,14 @@ How the errors on unseen recordings are obtained is the caller's choice; tables 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from itertools import pairwise
 from math import isfinite, sqrt
 from typing import Any
 
+import numpy as np
+
 from wipx.proof.blind_robots.dirty_score import DirtyScore, dirty_score
+from wipx.proof.blind_robots.tree_score import TreeScore, same_force, tree_score
 
 LEAST_SHARE = 0.1  # of the mismatch that a site must be given to count as named
 
@@ -111,6 +114,7 @@ class CaseScore:
         failure: Why there is no answer; empty where there is one.
         dirty: What was named of a dirty robot, of which `exact` forgives laws that correct what the owner has wrong;
             None for an exact robot.
+        tree: What was named joint by joint; None for a robot of the five plants.
     """
 
     case: str
@@ -135,6 +139,7 @@ class CaseScore:
     seconds: float
     failure: str = ""
     dirty: DirtyScore | None = None
+    tree: TreeScore | None = None
 
     @property
     def accused(self) -> bool | None:
@@ -165,6 +170,9 @@ def score(
     hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
     named = {effect["name"]: effect for effect in diagnosis["effects"]}
     verdict, outside = diagnosis["verdict"], None if truth["outside"] is None else truth["outside"]["name"]
+    of_tree = "joints" in truth
+    if of_tree:
+        named = same_force(named, tuple(hidden))
     found = matches(tuple(hidden), named)
     expected = "unexplained" if outside else "mismatch" if hidden else "consistent"
     location = diagnosis["location"]
@@ -172,6 +180,7 @@ def score(
     if truth["dirt"] is not None:
         dirty = dirty_score(truth, tuple(named), found, None if errors is None else errors.over_reference())
     allowed = len(named) if dirty is None else len(named) - dirty.corrected
+    tree = tree_score(truth, tuple(named), found, location["sites"]) if of_tree else None
     right = verdict == expected if dirty is None else _right_of_dirty(verdict, dirty)
     return CaseScore(
         case=case,
@@ -185,7 +194,7 @@ def score(
         exact=None if outside else len(found) == len(hidden) == allowed,
         false_alarms=len(named) - len(found) if dirty is None else dirty.false_laws,
         verdict_right=right,
-        site_right=_site_right(found, tuple(hidden), location["sites"]) if hidden else None,
+        site_right=_site_right(found, tuple(hidden), location["sites"], tree) if hidden else None,
         region_error=_region_error(truth["regions"], location["regions"]),
         time_error=_time_error(truth["times"], location["times"]),
         parameters=_parameters(hidden, named),
@@ -195,6 +204,7 @@ def score(
         over_floor=None if errors is None else errors.over_floor(),
         seconds=seconds,
         dirty=dirty,
+        tree=tree,
     )
 
 
@@ -230,6 +240,7 @@ def failed(case: str, truth: Mapping[str, Any], seconds: float, failure: str) ->
         seconds=seconds,
         failure=failure,
         dirty=None if truth["dirt"] is None else DirtyScore(len(hidden), 0, 0, 0, 0, None),
+        tree=tree_score(truth, (), {}, {}) if "joints" in truth else None,
     )
 
 
@@ -242,23 +253,23 @@ def matches(hidden: tuple[str, ...], named: Mapping[str, Mapping[str, Any]]) -> 
 
     A hidden effect is found under its own name or as an equivalent of the named one, which stands for one only.
     """
-    best: dict[str, str] = {}
+    from scipy.optimize import linear_sum_assignment
+
     exact = {name: name for name in hidden if name in named}
     open_hidden = [name for name in hidden if name not in exact]
     free = [name for name in named if name not in exact]
-    for order in permutations(open_hidden):
-        pairs, left = {}, list(free)
-        for name in order:
-            answer = next((one for one in left if name in named[one].get("equivalent", ())), None)
-            if answer is not None:
-                pairs[name] = answer
-                left.remove(answer)
-        if len(pairs) > len(best):
-            best = pairs
-    return {**exact, **best}
+    stands = np.array([[name in named[one].get("equivalent", ()) for one in free] for name in open_hidden], dtype=int)
+    if not stands.size:
+        return exact
+    pairs = zip(*linear_sum_assignment(stands, maximize=True), strict=True)
+    return {**exact, **{open_hidden[i]: free[j] for i, j in pairs if stands[i, j]}}
 
 
-def _site_right(found: Mapping[str, str], hidden: tuple[str, ...], sites: Mapping[str, float]) -> bool:
+def _site_right(
+    found: Mapping[str, str], hidden: tuple[str, ...], sites: Mapping[str, float], tree: TreeScore | None
+) -> bool:
+    if tree is not None:
+        return tree.sites == tree.effects
     # where effects cannot be told apart, the site of the one that was named is as right as the hidden one's
     allowed = [{name.partition("/")[0], found.get(name, name).partition("/")[0]} for name in hidden]
     if not sites:

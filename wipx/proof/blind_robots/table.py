@@ -11,6 +11,7 @@ from scipy.stats import beta
 
 from wipx.proof.blind_robots.cases import DIRTY_TIERS, TIERS
 from wipx.proof.blind_robots.score import CaseScore, ParameterScore
+from wipx.proof.blind_robots.trees.cases import TREE_TIERS
 
 CONFIDENCE = 0.95
 CONTRASTS = (3.0, 10.0, 30.0, 100.0)  # edges of the bins of signal to noise
@@ -87,8 +88,8 @@ class GroupScore:
 
 
 def by_tier(scores: Sequence[CaseScore]) -> tuple[GroupScore, ...]:
-    """Scores by tier, in the order of `TIERS` and `DIRTY_TIERS`, and of all cases; tiers without cases are left out."""
-    groups = [(tier, [one for one in scores if one.tier == tier]) for tier in (*TIERS, *DIRTY_TIERS)]
+    """Scores by tier, exact robots first, dirty ones, trees, and of all cases; tiers without cases are left out."""
+    groups = [(tier, [one for one in scores if one.tier == tier]) for tier in (*TIERS, *DIRTY_TIERS, *TREE_TIERS)]
     return tuple(group_score(name, group) for name, group in [*groups, ("all", list(scores))] if group)
 
 

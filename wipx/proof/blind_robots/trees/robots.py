@@ -10,7 +10,7 @@ from wipx.proof.blind_robots.trees.dynamics import at_poses, room
 from wipx.proof.blind_robots.trees.links import Link, rotation
 from wipx.proof.blind_robots.trees.physics import Drive, body_of
 
-JOINT_SHARES = {1: 0.08, 2: 0.12, 3: 0.18, 4: 0.16, 5: 0.14, 6: 0.18, 7: 0.14}
+JOINT_SHARES = {1: 0.05, 2: 0.07, 3: 0.18, 4: 0.18, 5: 0.16, 6: 0.2, 7: 0.16}
 NAMES = (
     ("base", "shoulder", "upper_arm", "elbow", "forearm", "wrist", "hand"),
     ("joint_1", "joint_2", "joint_3", "joint_4", "joint_5", "joint_6", "joint_7"),

@@ -12,6 +12,7 @@ from wipx.proof.blind_robots.trees.logging import Run
 from wipx.proof.blind_robots.trees.robots import Robot
 
 Values = Mapping[str, float]
+FASTEST_DRAG = 15.0  # [1/s], rate at which drag brakes a joint at its top speed; air and oil are not stiffer
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +150,9 @@ def _asymmetric(site: str, draw: Draw) -> Values:
 
 
 def _drag(site: str, draw: Draw) -> Values:
-    return {"c": draw.force(site) / draw.doing.speed[draw.joint(site)] ** 2}
+    j = draw.joint(site)
+    most = FASTEST_DRAG * draw.robot.light[j] / draw.doing.top_speed[j]
+    return {"c": min(draw.force(site) / draw.doing.speed[j] ** 2, most)}
 
 
 def _load_friction(site: str, draw: Draw) -> Values:

@@ -1,0 +1,108 @@
+"""Inverse dynamics of a robot from a model file, linear in the inertial numbers of its links, for signals in numpy.
+
+Forces are those of the drives that the motion needs; laws of friction and drives are those of contract section 6 that
+the literature fits: viscous and Coulomb friction, constant offsets, reflected inertia of the rotors, gains.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wipx.core.model import Model, ModelBatch
+from wipx.core.tree import Tree
+from wipx.sim.tree import equations as E
+from wipx.sim.tree.inertias import gravity, inertial_numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """What the joints do, on rows of any recordings.
+
+    Attributes:
+        coordinates: Shape (rows, joints) [rad or m].
+        rates: Likewise.
+        accelerations: Likewise.
+        forces: Of the drives without any effect, shape (rows, joints) [N m or N]; zero at a passive joint.
+        slides: Direction of motion, from -1 to 1 where noise cannot feign it, shape (rows, joints).
+    """
+
+    coordinates: np.ndarray
+    rates: np.ndarray
+    accelerations: np.ndarray
+    forces: np.ndarray
+    slides: np.ndarray
+
+
+def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
+    """Forces of the joints per unit of each inertial number, shape (rows, joints, 10 N).
+
+    Args:
+        tree: Links and joints.
+        signals: Motion.
+        weight: Gravity in the frame of the base, shape (3,) [m/s^2].
+    """
+    q, v, a = (each.T for each in (signals.coordinates, signals.rates, signals.accelerations))
+    poses = [E.pose(link, q[i], np.sin(q[i]), np.cos(q[i])) for i, link in enumerate(tree.links)]
+    pull = (float(weight[0]), float(weight[1]), float(weight[2]))
+    found = np.zeros((q.shape[1], len(q), E.NUMBERS * len(q)))
+    none = _inertia(np.zeros(E.NUMBERS))
+    for column in range(found.shape[2]):
+        own = [none] * len(q)
+        own[column // E.NUMBERS] = _inertia(np.eye(E.NUMBERS)[column % E.NUMBERS])
+        inertial = E.product(tree, E.mass_matrix(tree, poses, own, [0.0] * len(q)), list(a))
+        velocity = E.bias(tree, poses, list(v), own, pull)
+        for j in range(len(q)):
+            found[:, j, column] = np.asarray(inertial[j] + velocity[j], dtype=float)
+    return found
+
+
+def _inertia(numbers: np.ndarray) -> E.Inertia:
+    mass, x, y, z, *rest = numbers.tolist()
+    return E.Inertia(mass, (x, y, z), *rest)
+
+
+def numbers(model: Model) -> np.ndarray:
+    """Inertial numbers of all links, with the effects at links, shape (10 N,)."""
+    tree = model.plant.tree
+    assert tree is not None
+    batch = ModelBatch(model)
+    return np.concatenate([inertial_numbers(batch, link)[:, 0] for link in tree.links])
+
+
+def missing(model: Model, signals: Signals, carried: np.ndarray) -> np.ndarray:
+    """Forces that the motion needs and the model does not give, shape (rows, joints) [N m or N].
+
+    Args:
+        model: Laws of `NAMED` and links; other effects are not seen.
+        signals: Motion and forces.
+        carried: Of `regressor`.
+    """
+    plant = model.plant
+    assert plant.tree is not None
+    needed = carried @ numbers(model)
+    for j, link in enumerate(plant.tree.links):
+        site, drive = link.joint, f"actuator_{link.joint}"
+        rotor = model.parameters[f"{site}.armature"] + _of(model, f"{site}/rotor_inertia", "J")
+        viscous = model.parameters[f"{site}.damping"] + _of(model, f"{site}/viscous", "sigma")
+        dry = model.parameters[f"{site}.friction"] + _of(model, f"{site}/coulomb", "F_c")
+        needed[:, j] += rotor * signals.accelerations[:, j] + viscous * signals.rates[:, j] + dry * signals.slides[:, j]
+        given = _of(model, f"{drive}/gain", "k", 1.0) * (signals.forces[:, j] + _of(model, f"{drive}/offset", "F_0"))
+        needed[:, j] -= given
+    return needed
+
+
+def _of(model: Model, effect: str, symbol: str, absent: float = 0.0) -> float:
+    return model.effects[effect][symbol] if effect in model.effects else absent
+
+
+def weight_of(model: Model) -> np.ndarray:
+    """Gravity in the frame of the base, shape (3,) [m/s^2]."""
+    assert model.plant.tree is not None
+    return gravity(ModelBatch(model), model.plant.tree)[:, 0]
+
+
+NAMED = {  # kinds that are fitted, by class of site
+    "joint": ("viscous", "coulomb", "rotor_inertia"),
+    "drive": ("offset", "gain"),
+    "link": ("payload", "com_offset", "inertia"),
+}
