@@ -113,7 +113,7 @@ def test_products_are_those_of_the_matrix_of_lagged_rows(fresh_seed: int):
     innovations, counted, surprises = ragged(np.random.default_rng(fresh_seed))
     for begin, end, known in ((0, 4, surprises), (0, 3, surprises[:, :0]), (3, 4, surprises[:, :0])):
         matrix = design(innovations[:, begin:end], counted, known)
-        found = lagged_products(innovations, begin, end, counted, known)
+        found = lagged_products(innovations[:, begin:end], counted, known)
         np.testing.assert_allclose(found, matrix.T @ matrix, atol=1e-10)
 
 

@@ -137,9 +137,9 @@ class InnovationFitter(Fitter):
 
     def noise_of(self, errors: np.ndarray, levels: NoiseLevels, model: Model) -> list[NoiseModel]:
         """The noise model of each model's innovations."""
-        scale = _log_determinant(self.innovations_model.gains(levels, model).whitening, self.data)
-        colours = [noise_model_of(each, self.data) for each in errors]
-        return [replace(noise_model, log_likelihood=noise_model.log_likelihood + scale) for noise_model in colours]
+        scale = _log_determinants(self.innovations_model.gains(levels, model).whitening, self.data)
+        found = [noise_model_of(each, self.data) for each in errors]
+        return [replace(noise_model, by_group=noise_model.by_group + scale) for noise_model in found]
 
     def whitened(self, errors: np.ndarray, noise: NoiseModel) -> np.ndarray:
         """White innovations, shape (P, R, m, K + 1)."""
@@ -157,30 +157,45 @@ class InnovationFitter(Fitter):
     def levels_of(self, fit: Fit) -> NoiseLevels:
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
-        The levels' common factor does not matter: the first sensor's level is kept.
+        Groups of channels are searched side by side: what a level does to the likelihood of another group is left
+        aside in a step, but the step must make all of them likelier together. A common factor of a group's levels does
+        not matter: the first sensor's is kept.
 
         Args:
             fit: Where to start.
         """
-        fixed = len(fit.levels.force)
         levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
-        centre = best = _logarithms(levels)
-        free = [i for i in range(len(best)) if i != fixed]
+        centre = before = best = _logarithms(levels)
+        free = self._free_levels
+        known = np.full(len(free), -np.inf)
         for step in LEVEL_STEPS:
             move = np.zeros_like(best)
             for _ in range(12):
-                trials = [best + sign * step * np.eye(len(best))[i] for i in free for sign in (-1.0, 1.0)]
+                moves = _single_moves(free, step, len(best))
                 if np.count_nonzero(move) > 1:
-                    trials.append(best + move)
-                trials = [np.clip(trial, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for trial in trials]
+                    moves.append(move)
+                trials = [np.clip(best + each, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for each in moves]
                 likelihoods = search.likelihoods([best, *trials])
-                gains = likelihoods[1:] - likelihoods[0]
-                move = _joined(gains[: 2 * len(free)], step, free, len(best))
-                if gains.max() <= LEVEL_GAIN:
+                if likelihoods[0].sum() < known.sum():
+                    best = before
                     break
-                best = trials[int(gains.argmax())]
+                gains = likelihoods[1:] - likelihoods[0]
+                move = _joined(gains, moves, free)
+                if gains.max(axis=0).sum() <= LEVEL_GAIN:
+                    break
+                before, known = best, likelihoods[0]
+                best = _best_of_each(gains, trials, best, free)
         return _levels(best, levels)
+
+    @cached_property
+    def _free_levels(self) -> tuple[tuple[int, ...], ...]:
+        """Which levels are searched for each group of channels: all of its joints and channels but the first sensor."""
+        data, joints = self.data, self.data.joints
+        return tuple(
+            (*(int(data.channels[c]) for c in group if data.channels[c] < joints), *(joints + c for c in group[1:]))
+            for group in data.groups
+        )
 
     def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
         """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
@@ -219,14 +234,17 @@ class InnovationFitter(Fitter):
         observers = tuple(gains[i] for i in different)
         batch = hypotheses[0].space.batch(cubes)
         innovations = self.innovations_model.innovations(batch, observers, group, np.full(batch.size, levels.spread))
-        scales = [_log_determinant(observer.whitening, self.innovations_model.data) for observer in observers]
+        scales = [_log_determinants(observer.whitening, self.innovations_model.data).sum() for observer in observers]
         priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
         data = self.innovations_model.data
         likelihoods = np.array([noise_model_of(each, data).log_likelihood for each in innovations]) - priors
         return likelihoods + np.array(scales)[group]
 
-    def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[float]:
-        """Log-likelihoods of one model with several noise levels."""
+    def likelihoods(self, hypothesis: Hypothesis, levels: Sequence[NoiseLevels]) -> list[np.ndarray]:
+        """Log-likelihoods of one model with several noise levels, of each group of channels, shape (G,) each.
+
+        The first group bears those of priors and reported forces.
+        """
         data = self.innovations_model.data
         gains = self.innovations_model.gains_of(levels, hypothesis.model)
         count = len(levels)
@@ -234,12 +252,12 @@ class InnovationFitter(Fitter):
         spread = np.array([level.spread for level in levels])
         innovations = self.innovations_model.innovations(batch, gains, np.arange(count), spread)
         priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
-        return [
-            _log_determinant(g.whitening, data)
-            + noise_model_of(each, data).log_likelihood
-            - 0.5 * float(priors @ priors)
-            for g, each in zip(gains, innovations, strict=True)
-        ]
+        found = []
+        for g, each in zip(gains, innovations, strict=True):
+            noise_model = noise_model_of(each, data)
+            found.append(_log_determinants(g.whitening, data) + noise_model.by_group)
+            found[-1][0] += noise_model.reported - 0.5 * float(priors @ priors)
+        return found
 
 
 @dataclass(frozen=True)
@@ -249,10 +267,10 @@ class _LevelSearch:
     fitter: InnovationFitter
     hypothesis: Hypothesis
     levels: NoiseLevels
-    known: dict[tuple[float, ...], float] = field(default_factory=dict)
+    known: dict[tuple[float, ...], np.ndarray] = field(default_factory=dict)
 
     def likelihoods(self, points: Sequence[np.ndarray]) -> np.ndarray:
-        """Log-likelihoods of points; those that are not known yet are simulated at once."""
+        """Log-likelihoods of points by group, (points, G); those that are not known yet are simulated at once."""
         fresh = {_key(point): point for point in points if _key(point) not in self.known}
         if fresh:
             levels = [_levels(point, self.levels) for point in fresh.values()]
@@ -275,17 +293,40 @@ def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
     return NoiseLevels(values[:joints], values[joints:], like.spread)
 
 
-def _joined(gains: np.ndarray, step: float, free: list[int], count: int) -> np.ndarray:
-    """All single moves that gained, made at once; gains in pairs (-, +) for each free level."""
-    move = np.zeros(count)
-    for i, index in enumerate(free):
-        down, up = gains[2 * i], gains[2 * i + 1]
-        if max(down, up) > 0.0:
-            move[index] = step if up > down else -step
-    return move
+def _single_moves(free: Sequence[Sequence[int]], step: float, count: int) -> list[np.ndarray]:
+    """Moves of one level of every group, down and up, for the first levels, then the second ones, and so on."""
+    moves = []
+    for place in range(max(len(levels) for levels in free)):
+        for sign in (-1.0, 1.0):
+            moves.append(np.zeros(count))
+            moves[-1][[levels[place] for levels in free if place < len(levels)]] = sign * step
+    return moves
 
 
-def _log_determinant(whitening: np.ndarray, data) -> float:
-    """Sum of log det of the whitening over the rows that count."""
-    diagonal = np.einsum("krcc->krc", whitening)[data.counted]
-    return float(np.log(diagonal.prod(axis=1)).sum())
+def _joined(gains: np.ndarray, moves: Sequence[np.ndarray], free: Sequence[Sequence[int]]) -> np.ndarray:
+    """All single moves that gained, made at once; gains (moves, G), those of single moves in pairs (-, +)."""
+    joined = np.zeros_like(moves[0])
+    for g, levels in enumerate(free):
+        for place, index in enumerate(levels):
+            down, up = 2 * place, 2 * place + 1
+            if max(gains[down, g], gains[up, g]) > 0.0:
+                joined[index] = moves[up if gains[up, g] > gains[down, g] else down][index]
+    return joined
+
+
+def _best_of_each(
+    gains: np.ndarray, trials: Sequence[np.ndarray], best: np.ndarray, free: Sequence[Sequence[int]]
+) -> np.ndarray:
+    """The levels of every group from the trial in which it gained most, where any did."""
+    found = best.copy()
+    for g, levels in enumerate(free):
+        i = int(gains[:, g].argmax())
+        if gains[i, g] > 0.0:
+            found[list(levels)] = trials[i][list(levels)]
+    return found
+
+
+def _log_determinants(whitening: np.ndarray, data: RecordingBatch) -> np.ndarray:
+    """Sums of the logarithms of the whitening's diagonal over the rows that count, of each group, shape (G,)."""
+    diagonal = np.log(np.einsum("krcc->krc", whitening)[data.counted]).sum(axis=0)
+    return np.array([diagonal[list(group)].sum() for group in data.groups])

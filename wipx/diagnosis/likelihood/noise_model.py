@@ -2,7 +2,7 @@
 
 A fixed observer leaves innovations that are a stationary linear process whatever the sensors' noise is;
 least squares on their past makes them white (Box, Jenkins 1976, Time Series Analysis), and the
-likelihood of what remains is that of the recordings.
+likelihood of what remains is that of the recordings. Signals of one group (`RecordingBatch.groups`) share their past.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,19 @@ class NoiseModel:
         weights: From past innovations, then from the commands' surprises (see `RecordingBatch.surprises`), to the
             present, shape (len(LAGS) m + SURPRISES inputs, m).
         whitening: Inverse Cholesky factor of what it leaves, shape (m, m).
-        log_likelihood: Of the innovations that it was fitted to, up to a constant.
-        reported: The part of it that is the reported forces'.
+        by_group: Log-likelihood of the innovations of each group that it was fitted to, up to a constant, shape (G,).
+        reported: And of the reported forces.
     """
 
     weights: np.ndarray
     whitening: np.ndarray
-    log_likelihood: float
+    by_group: np.ndarray
     reported: float
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of all that it was fitted to, up to a constant."""
+        return float(self.by_group.sum()) + self.reported
 
 
 def noise_model_of(innovations: np.ndarray, data: RecordingBatch) -> NoiseModel:
@@ -43,22 +48,37 @@ def noise_model_of(innovations: np.ndarray, data: RecordingBatch) -> NoiseModel:
     motion in place of the physics that makes it.
     """
     m, channels = data.signals, len(data.channels)
-    rows = int(data.counted.sum())
-    lagged = np.tile(np.arange(m), len(LAGS))
-    motion = np.concatenate([lagged < channels, np.ones(SURPRISES * data.surprises.shape[1], dtype=bool)])
-    weights, whitening = np.zeros((len(motion), m)), np.zeros((m, m))
-    likelihoods = []
-    for known, begin, end, surprises in ((motion, 0, channels, data.surprises), (~motion, channels, m, NO_SURPRISES)):
-        likelihoods.append(0.0)
-        if end > begin:
-            products = lagged_products(innovations, begin, end, data.counted, surprises)
-            own, factor = _regressed(products, end - begin, rows)
-            weights[known, begin:end] = own
-            whitening[begin:end, begin:end] = np.linalg.inv(factor)
-            likelihoods[-1] -= rows * float(np.log(np.diag(factor)).sum())
+    inputs = data.surprises.shape[1]
+    weights, whitening = np.zeros((len(LAGS) * m + SURPRISES * inputs, m)), np.zeros((m, m))
     # Where the model ran away innovations stand at their limit, which a regression takes for well predicted.
-    runaway = LARGEST * np.count_nonzero((np.abs(innovations) >= LARGEST) & data.counted.T[:, None])
-    return NoiseModel(weights, whitening, sum(likelihoods) - runaway, likelihoods[1])
+    runaway = LARGEST * np.count_nonzero((np.abs(innovations) >= LARGEST) & data.counted.T[:, None], axis=(0, 2))
+    likelihoods = []
+    for group in (*data.groups, tuple(range(channels, m))):
+        surprises = data.surprises if group and group[0] < channels else NO_SURPRISES
+        likelihoods.append(_fit_group(innovations, group, data.counted, surprises, weights, whitening))
+        likelihoods[-1] -= float(runaway[list(group)].sum())
+    return NoiseModel(weights, whitening, np.array(likelihoods[:-1]), likelihoods[-1])
+
+
+def _fit_group(
+    innovations: np.ndarray,
+    group: tuple[int, ...],
+    counted: np.ndarray,
+    surprises: np.ndarray,
+    weights: np.ndarray,
+    whitening: np.ndarray,
+) -> float:
+    """Write weights and whitening of the signals of one group, and return the likelihood of their innovations."""
+    if not group:
+        return 0.0
+    signals, m, rows = list(group), len(whitening), int(counted.sum())
+    products = lagged_products(innovations[:, signals], counted, surprises)
+    own, factor = _regressed(products, len(signals), rows)
+    past = [lag * m + signal for lag in range(len(LAGS)) for signal in signals]
+    known = [*past, *range(len(LAGS) * m, len(LAGS) * m + SURPRISES * surprises.shape[1])]
+    weights[np.ix_(known, signals)] = own
+    whitening[np.ix_(signals, signals)] = np.linalg.inv(factor)
+    return -rows * float(np.log(np.diag(factor)).sum())
 
 
 def whitened(innovations: np.ndarray, noise_model: NoiseModel, data: RecordingBatch) -> np.ndarray:
@@ -72,9 +92,7 @@ def whitened_change(change: np.ndarray, noise_model: NoiseModel, data: Recording
     return _whitened(change, data.counted, LAGS, none, noise_model.weights, noise_model.whitening)
 
 
-def lagged_products(
-    innovations: np.ndarray, begin: int, end: int, counted: np.ndarray, surprises: np.ndarray
-) -> np.ndarray:
+def lagged_products(innovations: np.ndarray, counted: np.ndarray, surprises: np.ndarray) -> np.ndarray:
     """Sums over the rows that count of products of what a regression knows and foretells.
 
     The present of n signals comes first, then their past, lag by lag, then the commands' surprises: the products are
@@ -82,22 +100,20 @@ def lagged_products(
     zero in the past of others.
 
     Args:
-        innovations: Shape (R, m, K + 1).
-        begin: First of the n signals.
-        end: Signal after the last.
+        innovations: Of n signals, shape (R, n, K + 1).
         counted: Rows that count, shape (K + 1, R).
         surprises: Of the commands, shape (R, inputs, K + 1); no inputs where they tell nothing.
     """
     lags = np.concatenate([[0], LAGS])
-    n, inputs = end - begin, surprises.shape[1]
+    n, inputs = innovations.shape[1], surprises.shape[1]
     out = np.zeros((n * len(lags) + SURPRISES * inputs,) * 2)
     for r in range(len(innovations)):
         if counted[:, r].any():
             first = int(np.argmax(counted[:, r]))  # rows that count follow each other
             last = first + int(counted[:, r].sum()) - 1
-            _add_past(innovations[r, begin:end], lags, first, last, out)
+            _add_past(innovations[r], lags, first, last, out)
             if inputs:
-                _add_surprises(innovations[r, begin:end], surprises[r], lags, first, last, out)
+                _add_surprises(innovations[r], surprises[r], lags, first, last, out)
     return np.tril(out) + np.tril(out, -1).T
 
 
@@ -176,7 +192,9 @@ def _whitened(innovations, counted, lags, surprises, weights, whitening):
             for c in range(m):
                 left[c, :count] = known[c, before : before + count]
                 for d in range(m):
-                    _subtract_past(left[c, :count], known[d], lags, weights[d : len(lags) * m : m, c])
+                    of_past = weights[d : len(lags) * m : m, c]
+                    if of_past.any():
+                        _subtract_past(left[c, :count], known[d], lags, of_past)
                 for i in range(SURPRISES):
                     for d in range(surprises.shape[1]):
                         weight = weights[len(lags) * m + i * surprises.shape[1] + d, c]
@@ -184,7 +202,8 @@ def _whitened(innovations, counted, lags, surprises, weights, whitening):
                         _subtract(left[c, begin - first : count], surprises[r, d, begin - 1 - i :], weight)
             for c in range(m):
                 for d in range(c + 1):
-                    _subtract(out[p, r, c, first : first + count], left[d], -whitening[c, d])
+                    if whitening[c, d] != 0.0:
+                        _subtract(out[p, r, c, first : first + count], left[d], -whitening[c, d])
     return out
 
 

@@ -87,17 +87,17 @@ def _correct(covariance, i, j, late, noise, half, root):
 
     The covariance loses half half', where half is the gain times the deviation of the innovation, 1 / root.
     """
-    lanes = len(noise)
-    for a in range(4):
+    n, lanes = len(half), len(noise)
+    for a in range(n):
         for w in range(lanes):
             half[a, w] = covariance[a, i, w] - late * covariance[a, j, w]
     for w in range(lanes):
         root[w] = 1.0 / np.sqrt(half[i, w] - late * half[j, w] + noise[w])
-    for a in range(4):
+    for a in range(n):
         for w in range(lanes):
             half[a, w] *= root[w]
-    for a in range(4):
-        for b in range(4):
+    for a in range(n):
+        for b in range(n):
             for w in range(lanes):
                 covariance[a, b, w] -= half[a, w] * half[b, w]
 
@@ -117,42 +117,46 @@ def _whiten(c, i, j, late, half, root, whitening):
 @cached
 def _predict(covariance, transition, half):
     """The covariance one interval later, but for the forces."""
-    lanes = covariance.shape[2]
-    for a in range(4):
-        for b in range(4):
-            for w in range(lanes):
-                total = 0.0
-                for q in range(4):
-                    total += transition[a, q, w] * covariance[q, b, w]
-                half[a, b, w] = total
-    for a in range(4):
+    n, _, lanes = covariance.shape
+    for a in range(n):
+        for b in range(n):
+            _multiply_add(half[a, b], transition[a], covariance[:, b], lanes)
+    for a in range(n):
         for b in range(a + 1):
+            _multiply_add(covariance[a, b], half[a], transition[b], lanes)
             for w in range(lanes):
-                total = 0.0
-                for q in range(4):
-                    total += half[a, q, w] * transition[b, q, w]
-                covariance[a, b, w] = total
-                covariance[b, a, w] = total
+                covariance[b, a, w] = covariance[a, b, w]
+
+
+@cached
+def _multiply_add(total, left, right, lanes):
+    """Write the sum over an even number of products, two at a time: half as often through the lanes."""
+    for w in range(lanes):
+        total[w] = left[0, w] * right[0, w] + left[1, w] * right[1, w]
+    for q in range(2, len(left), 2):
+        for w in range(lanes):
+            total[w] += left[q, w] * right[q, w] + left[q + 1, w] * right[q + 1, w]
 
 
 @cached
 def _shake(covariance, drive, dt):
     """What white forces, held over the interval, add to the covariance."""
-    for i in range(2):
-        for j in range(2):
-            for w in range(len(dt)):
+    joints, _, lanes = drive.shape
+    for i in range(joints):
+        for j in range(joints):
+            for w in range(lanes):
                 covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0
-                covariance[i, 2 + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
-                covariance[2 + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
-                covariance[2 + i, 2 + j, w] += drive[i, j, w] * dt[w]
+                covariance[i, joints + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[joints + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
+                covariance[joints + i, joints + j, w] += drive[i, j, w] * dt[w]
 
 
 @cached
 def _combine(half, whitening, gain):
-    """Gain by which each channel's error moves the states, shape (4, m, lanes): that of all channels at once."""
-    m, _, lanes = half.shape
+    """Gain by which each channel's error moves the states, shape (n, m, lanes): that of all channels at once."""
+    m, n, lanes = half.shape
     gain[:] = 0.0
-    for q in range(4):
+    for q in range(n):
         for d in range(m):
             for c in range(d, m):
                 for w in range(lanes):
@@ -160,28 +164,21 @@ def _combine(half, whitening, gain):
 
 
 @cached
-def _move(a, b, place, interval, force, recording, recordings, transition, drive, dt):
+def _move(a, b, place, interval, force, recording, recordings, own, transition, drive, dt):
     """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
-    joints = b.shape[1]
-    own = np.zeros((2 * joints, 2 * joints))
+    joints, n = b.shape[1], len(own)
     transition_over(a[place], interval, own)
     for level in range(len(force)):
         w = level * recordings + recording
         dt[w] = interval
-        for i in range(2 * joints):
-            for j in range(2 * joints):
-                transition[_among_four(i, joints), _among_four(j, joints), w] = own[i, j]
+        for i in range(n):
+            for j in range(n):
+                transition[i, j, w] = own[i, j]
         for i in range(joints):
             for j in range(joints):
                 drive[i, j, w] = 0.0
                 for q in range(joints):
                     drive[i, j, w] += b[place, i, q] * b[place, j, q] * force[level, q]
-
-
-@cached
-def _among_four(state, joints):
-    """Place of a state of a plant among those of two joints."""
-    return state if state < joints else 2 + state - joints
 
 
 @cached
@@ -198,8 +195,9 @@ def _begin(covariance, sensor, time, k):
             covariance[:, :, r::recordings] = 0.0
             for level in range(levels):
                 for j in range(joints):
-                    covariance[j, j, level * recordings + r] = 9.0 * factor * sensor[level, j]
-                    covariance[2 + j, 2 + j, level * recordings + r] = 9.0 * factor * sensor[level, j] / 0.02**2
+                    known = 9.0 * factor * sensor[level, j]
+                    covariance[j, j, level * recordings + r] = known
+                    covariance[joints + j, joints + j, level * recordings + r] = known / 0.02**2
 
 
 @cached
@@ -220,7 +218,7 @@ def _store(gain, inverse, channels, exists, gains, whitening):
                 w = level * recordings + r
                 for c in range(len(channels)):
                     for i in range(n):
-                        gains[level, r, i, channels[c]] = gain[_among_four(i, n // 2), c, w]
+                        gains[level, r, i, channels[c]] = gain[i, c, w]
                     for d in range(c + 1):
                         whitening[level, r, c, d] = inverse[c, d, w]
 
@@ -229,21 +227,20 @@ def _store(gain, inverse, channels, exists, gains, whitening):
 def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, gains, whitening):
     """Fill in gains (L, K + 1, R, n, n) and whitening (L, K + 1, R, m, m) of L noise levels.
 
-    A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes. A joint
-    that a plant lacks stays at zero, so that the other loops have constant lengths.
+    A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes.
     """
     rows, recordings = place.shape
     joints, m = b.shape[1], len(channels)
-    lanes = len(force) * recordings
-    covariance, work, transition = np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes)), np.zeros((4, 4, lanes))
-    drive, dt, noise = np.zeros((2, 2, lanes)), np.zeros(lanes), np.zeros(lanes)
-    half, root = np.zeros((m, 4, lanes)), np.zeros((m, lanes))
-    inverse, gain = np.zeros((m, m, lanes)), np.zeros((4, m, lanes))
+    n, lanes = 2 * joints, len(force) * recordings
+    covariance, work, transition = np.zeros((n, n, lanes)), np.zeros((n, n, lanes)), np.zeros((n, n, lanes))
+    drive, dt, noise = np.zeros((joints, joints, lanes)), np.zeros(lanes), np.zeros(lanes)
+    half, root = np.zeros((m, n, lanes)), np.zeros((m, lanes))
+    inverse, gain, own = np.zeros((m, m, lanes)), np.zeros((n, m, lanes)), np.zeros((n, n))
     for k in range(rows):
         _begin(covariance, sensor[:, :joints], time, k)
         for c in range(m):
-            i = _among_four(channels[c], joints)
-            j, delay = (i + 2, late[channels[c]]) if i < 2 else (i, 0.0)
+            i = channels[c]
+            j, delay = (i + joints, late[i]) if i < joints else (i, 0.0)
             _hear(sensor[:, c], time[k], delay, noise)
             _correct(covariance, i, j, delay, noise, half[c], root[c])
             _whiten(c, i, j, delay, half, root, inverse)
@@ -253,6 +250,6 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
             break
         for r in range(recordings):
             louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
-            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, transition, drive, dt)
+            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, own, transition, drive, dt)
         _predict(covariance, transition, work)
         _shake(covariance, drive, dt)

@@ -62,6 +62,17 @@ class RecordingBatch:
         """With the reported forces of other recordings, all zero: they then tell nothing."""
         return replace(self, reported=np.zeros((len(self.rows), like.reported.shape[1], len(self.recordings))))
 
+    @cached_property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Which of the channels are weighed together, by index among `channels`.
+
+        All of a mechanism of one or two joints; those of each joint of a tree, where what one joint shows is hardly
+        foretold by the past of another.
+        """
+        if self.plant.tree is None:
+            return (tuple(range(len(self.channels))),)
+        return tuple(tuple(np.flatnonzero(self.channels % self.joints == j).tolist()) for j in range(self.joints))
+
     @property
     def signals(self) -> int:
         """Number m of signals whose errors are weighed: the channels, then the reported forces."""
