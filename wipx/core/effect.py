@@ -212,6 +212,10 @@ class Effect:
     with_constant: WithConstant | None = None
     indistinguishable: tuple[str, ...] = ()
 
+    def is_outside(self, plant: Plant) -> bool:
+        """Whether the contract lacks it for a plant: section 3, or section 6 for robots from model files."""
+        return self.outside_vocabulary and (plant.tree is None or self.on_machines is None)
+
     @property
     def neutral(self) -> dict[str, float]:
         """Values at which the effect is absent [SI], by parameter name."""

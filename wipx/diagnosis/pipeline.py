@@ -18,7 +18,7 @@ from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.rules import USUAL, Rules
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.search import Search
+from wipx.diagnosis.selection.robot_search import search_of
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
 from wipx.sim.analytic import AnalyticSimulator
@@ -101,11 +101,11 @@ def diagnose(
     nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
     store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)
-    first = store.extensions(nominal)
-    if context.is_driven:
+    if context.is_driven and setting.nominal.plant.tree is None:
+        first = store.extensions(nominal)
         check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
-    search = Search.of(store, nominal, context.held_out)
+    search = search_of(store, nominal, context.held_out)
     chosen = search.run()
     watcher("what is left over", 0.5)
     end = found(context, search, chosen)

@@ -46,11 +46,6 @@ class Diagnose:
         if not isinstance(simulator, AnalyticSimulator):
             raise InputError("a diagnosis follows recordings with an observer, which sim=analytic alone has; choose it")
         description = source.describe()
-        if description.model.plant.tree is not None:
-            raise InputError(
-                f"{source.path}: a robot from a model file cannot be diagnosed yet; "
-                "fit effects that you name with task=identify effects=[JOINT/coulomb, ...]"
-            )
         recordings = source.load()
         robot = KnownRobot(
             job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description)

@@ -34,7 +34,7 @@ def test_trials_lose_nothing_and_intervals_hold_drives_that_cross_alike(fresh_se
 def test_the_first_guess_crosses_about_as_the_true_drive_does(fresh_seed: int):
     case = bench("linear_axis", {PLAY: TRUE}, fresh_seed)
     nominal = case.fit()
-    gap, inertia, _, returned, _ = plays(case.fitter, nominal, basis_of(nominal))[0]
+    gap, inertia, _, returned, _ = plays(case.fitter, nominal, basis_of(nominal), "actuator/backlash")[0]
     assert returned == TRUE["returned"]
     assert 0.5 < gap * inertia / (TRUE["gap"] * TRUE["drive_inertia"]) < 2.0
 
@@ -90,4 +90,4 @@ def test_a_slow_log_has_guesses_of_the_delay_too():
     slow = Recording("r1.csv", {"t": t, "theta": np.pi + 0.1 * np.sin(t), "u": 0.1 * np.cos(t)})
     case = Bench(nominal, (slow, slow), {})
     begin = Hypothesis.of(case.setting, ("actuator/delay",), {})
-    assert delays(case.fitter, begin, case.quiet)
+    assert delays(case.fitter, begin, "actuator/delay", case.quiet)

@@ -54,13 +54,15 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     held_out, traces = judged(judge, trusted, repeated.models, context.recordings)
     fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
     ends = estimates(context.fitter, fit, search.nominal)
-    effects = _effects(context, search, rest, repeated, ends, shapes)
+    effects = _effects(context, search, fit, repeated, ends, shapes)
     wrong = not context.is_quiet(fit) or context.is_worse(fit)
     left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
     matters = left and fitted.times_the_floor > rules.trust.near_floor
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(context, rest), significant=left)
-    as_one = () if rest.significant else combined(context, search, fit)
+    parts = search.split(fit)
+    laws = [combined(context.beside(part), part, own) for part, own in parts] if not rest.significant else []
+    as_one = tuple(law for of_part in laws for law in of_part)
     before, after = (context.fitter.seen_by_row(each)[1] for each in (search.nominal, fit))
     location = located(context.by_row, before, after, effects, unexplained.site)
     draft = Diagnosis(
@@ -114,17 +116,32 @@ def _in_hindsight(candidate: ConsideredEffect, fit: Fit) -> ConsideredEffect:
 def _effects(
     context: Context,
     search: Search,
-    rest: Rest,
+    fit: Fit,
     repeated: Transfer,
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> tuple[FoundEffect, ...]:
-    fit = rest.fit
-    reduced = {effect: search.store.reduced(fit, effect) for effect in fit.effects}
-    gains = {effect: max(evidence(reduced[effect], fit), 0.0) for effect in fit.effects}
-    total = sum(gains.values()) or 1.0
     found = []
-    for effect in sorted(fit.effects, key=lambda e: -gains[e]):
+    for part, own in search.split(fit):
+        again = repeated if own is fit else transfer(part.store.fitter, own)
+        found += _effects_of_part(context.beside(part), part, own, again, ends, shapes)
+    total = sum(effect.log_evidence_gain for effect in found) or 1.0
+    shared = [replace(effect, share=effect.log_evidence_gain / total) for effect in found]
+    return tuple(sorted(shared, key=lambda effect: -effect.log_evidence_gain))
+
+
+def _effects_of_part(
+    context: Context,
+    search: Search,
+    fit: Fit,
+    repeated: Transfer,
+    ends: tuple[Estimate, ...],
+    shapes: list[Shape],
+) -> list[FoundEffect]:
+    """What is told of the effects of a part, in their order; their shares are left open."""
+    found = []
+    for effect in fit.effects:
+        reduced = search.store.reduced(fit, effect)
         law = effect_of(effect, context.data.plant)
         rivals, probability = _rivals(context, search, fit, effect)
         found.append(
@@ -132,18 +149,18 @@ def _effects(
                 effect,
                 law.law,
                 law.source,
-                law.outside_vocabulary,
+                law.is_outside(context.data.plant),
                 tuple(e for e in ends if e.name.startswith(f"{effect}.")),
                 tuple(rival.name for rival in rivals if rival.separation < context.rules.answer.told_apart),
                 rivals,
-                gains[effect],
-                context.held_out.gain(repeated, reduced[effect]),
+                max(evidence(reduced, fit), 0.0),
+                context.held_out.gain(repeated, reduced),
                 probability,
-                gains[effect] / total,
+                0.0,
                 law_curve(context.by_row, _taken_out(context, fit, effect), fit, effect, shapes),
             )
         )
-    return tuple(found)
+    return found
 
 
 def _taken_out(context: Context, fit: Fit, effect: str) -> Fit:
@@ -201,9 +218,7 @@ def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool
 
 def _unexplained(context: Context, rest: Rest) -> Unexplained:
     laws = {name: effect_of(name, context.data.plant) for name in rest.fit.effects}
-    outside_vocabulary = [
-        name for name, law in laws.items() if law.outside_vocabulary and not context.fitter.looks_for(name, law)
-    ]
+    outside_vocabulary = [name for name, law in laws.items() if not context.fitter.looks_for(name, law)]
     if rest.significant and outside_vocabulary:
         words = " and ".join(effect_in_words(name, context.data.plant.kind) for name in outside_vocabulary)
         return Unexplained(True, rest.p_value, outside_vocabulary[0].partition("/")[0], words, rest.resembles, None)
@@ -257,6 +272,8 @@ def proposed(
     rng: np.random.Generator,
 ) -> NextExperiment | None:
     """The experiment that settles what is tied or weak; None where nothing is."""
+    if context.data.plant.tree is not None:
+        return None
     tied = [(effect.name, name) for effect in answer.effects for name in effect.equivalent]
     rivals = [
         other

@@ -152,7 +152,7 @@ class _Asked:
     def free_size(self, base: Fit, values: Mapping[str, float]) -> Fit:
         """The fit of a base with the suspect, its size free."""
         known = base.hypothesis.values
-        if effect_of(self.name, self.context.data.plant).outside_vocabulary:
+        if not self.context.fitter.looks_for(self.name, effect_of(self.name, self.context.data.plant)):
             looked_at = candidates_beside(self.context.fitter, self.context.setting, base, outside_vocabulary=True)
         else:
             looked_at = self.search.store.candidates_for(base)

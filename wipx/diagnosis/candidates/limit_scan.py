@@ -8,7 +8,7 @@ import numpy as np
 
 from wipx.diagnosis.candidates.position_scan import left_of
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.force_response import FAST, motion_of, response
+from wipx.diagnosis.likelihood.force_response import FAST, drive_force, motion_of, response
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 
 GUESSES = 6
@@ -18,36 +18,37 @@ SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of th
 SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 
-def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
     """Likely largest forces [N or N m], best first, shape (up to GUESSES, 1).
 
     Args:
         fitter: Of the fit.
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
+        effect: Its name "site/saturation".
     """
-    return _likely(fitter, fit, basis, np.array([np.inf]))[:, :1]
+    return _likely(fitter, fit, basis, effect, np.array([np.inf]))[:, :1]
 
 
-def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
     """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES, 2).
 
     Args:
         fitter: Of the fit.
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
+        effect: Its name "site/speed_limit".
     """
-    return _likely(fitter, fit, basis, SPEEDS)
+    return _likely(fitter, fit, basis, effect, SPEEDS)
 
 
-def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, speeds: np.ndarray) -> np.ndarray:
     data = fitter.data
     plant = data.plant
     motion = motion_of(fitter, fit)
-    joints = [plant.joints.index(site) for site in plant.actuated]
-    model = fit.hypothesis.model
-    gain = model.parameters["input_gain"] * model.effects.get("actuator/gain", {}).get("k", 1.0)
-    forces = [np.where(data.rows, gain * motion[command], 0.0) for command in plant.commands]
+    driven = plant.joints_at(effect.partition("/")[0])
+    joints = [plant.joints.index(joint) for joint in driven]
+    forces = [np.where(data.rows, drive_force(fit.hypothesis.model, motion, joint), 0.0) for joint in driven]
     rates = [motion[plant.rates[joint]] for joint in joints]
     largest = max(float(np.abs(force).max()) for force in forces)
     fastest = max(1e-9, *(float(np.quantile(np.abs(rate[data.counted]), FAST)) for rate in rates))

@@ -20,19 +20,20 @@ SAME_SPOT = 0.7  # share that two spots have in common, from which they count as
 REGULARISATION = 1e-9
 
 
-def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
+def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
     """Amplitude [N or N m], periods per radian and phase of likely torque ripple, best first, shape (PEAKS, 3).
 
     Args:
         fitter: Of the fit.
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
+        effect: Its name "site/ripple".
     """
     plant = fitter.data.plant
     rows = fitter.data.rows
     motion = motion_of(fitter, fit)
     radius = fit.hypothesis.model.parameters["wheel_radius"] if "wheel_radius" in plant.parameters else 1.0
-    joints = [plant.joints.index(site) for site in plant.actuated]
+    joints = [plant.joints.index(site) for site in plant.joints_at(effect.partition("/")[0])]
     angles = [motion[plant.coordinates[joint]] / radius for joint in joints]
     way = max(float(np.ptp(angle[rows])) for angle in angles)
     numbers = max(1.0, TURNED / max(way, 1e-9)) * np.arange(1, FREQUENCIES + 1)
@@ -56,20 +57,22 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray
     return np.column_stack([amplitudes[chosen], numbers[chosen], phases[chosen]])
 
 
-def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray) -> np.ndarray:
-    """Level [N], begin and end [m] of likely sticky spots of the first joint, best first, shape (up to PEAKS, 3).
+def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
+    """Level [N or N m], begin and end [m or rad] of likely sticky spots, best first, shape (up to PEAKS, 3).
 
     Args:
         fitter: Of the fit.
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
+        effect: Its name "site/sticky_spot".
     """
     data = fitter.data
     motion = motion_of(fitter, fit)
-    x, rate = motion[data.plant.coordinates[0]], motion[data.plant.rates[0]]
+    joint = data.plant.joints.index(effect.partition("/")[0])
+    x, rate = motion[data.plant.coordinates[joint]], motion[data.plant.rates[joint]]
     edges = np.linspace(x[data.rows].min(), x[data.rows].max(), BINS + 1)
     inside = (x >= edges[:-1, None, None]) & (x < edges[1:, None, None]) & data.rows
-    slopes = response(fitter, fit, 0, np.where(inside, -direction(rate, data.rows), 0.0))
+    slopes = response(fitter, fit, joint, np.where(inside, -direction(rate, data.rows), 0.0))
     slopes = slopes - basis @ (basis.T @ slopes)
     # A spot is some bins in a row: sums over it are differences of sums from the beginning.
     score = np.concatenate([[0.0], np.cumsum(slopes.T @ left_of(fit, basis))])

@@ -25,7 +25,7 @@ FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proport
 FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
 CHUNK = 24  # models simulated at once; bounds the memory
 
-Scan = Callable[[InnovationFitter, Fit, np.ndarray], np.ndarray]
+Scan = Callable[[InnovationFitter, Fit, np.ndarray, str], np.ndarray]
 
 SCANS: dict[str, Scan] = {
     "periods": ripples,
@@ -70,8 +70,8 @@ def candidates_beside(
     present = set(fit.hypothesis.model.effects)
     found: list[Candidate] = []
     for name, effect in known.items():
-        wanted = effect.outside_vocabulary if outside_vocabulary else fitter.looks_for(name, effect)
-        if wanted and not _excluded(name, effect, present, known):
+        wanted = fitter.looks_for(name, effect) != outside_vocabulary
+        if wanted and setting.looks_at(name) and not _excluded(name, effect, present, known):
             found += candidates_of_effect(fitter, setting, fit, name)
     return sorted(found, key=lambda candidate: -candidate.gain)
 
@@ -115,7 +115,9 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     left = base - basis @ (basis.T @ base)
     scan = SCANS[effect.scan] if effect.scan else None
     atoms = (
-        perturbations(effect, setting.scales[name.partition("/")[0]]) if scan is None else _scanned(scan, fitter, fit)
+        perturbations(effect, setting.scales[name.partition("/")[0]])
+        if scan is None
+        else _scanned(scan, fitter, fit, name)
     )
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
@@ -140,10 +142,10 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     return found
 
 
-def _scanned(scan: Scan, fitter: Fitter, fit: Fit) -> np.ndarray:
+def _scanned(scan: Scan, fitter: Fitter, fit: Fit, name: str) -> np.ndarray:
     """First guesses of an effect from how innovations answer to forces at single rows."""
     by_row, seen = fitter.sketched_by_row(fit)
-    return scan(by_row, seen, basis_of(seen))
+    return scan(by_row, seen, basis_of(seen), name)
 
 
 def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np.ndarray]:

@@ -58,16 +58,26 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
     Small effects that held-out predictions do not show are kept where something is left without them and nothing
     with them: what is left is then no misfit of another law.
     """
-    kept = confirmed(context, search, chosen.fit)
+    kept = confirmed_by_part(context, search, chosen.fit)
     shapes = shapes_of(context.by_row, kept.fit)
     rest = remaining(context, search, kept.fit, shapes).after(kept.considered)
     if rest.significant and len(kept.fit.effects) < len(chosen.fit.effects):
-        more = confirmed(context, search, chosen.fit, small=True)
+        more = confirmed_by_part(context, search, chosen.fit, small=True)
         if set(more.fit.effects) > set(kept.fit.effects):
             whole = remaining(context, search, more.fit, shapes)
             if not whole.significant:
                 rest = whole.after(more.considered)
     return rest.after(chosen.considered), shapes
+
+
+def confirmed_by_part(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
+    """Each part of a robot without its effects that are not confirmed (`confirmed`)."""
+    parts = search.split(fit)
+    found = [confirmed(context.beside(part), part, own, small=small) for part, own in parts]
+    considered = tuple(each for chosen in found for each in chosen.considered)
+    if all(chosen.fit is own for chosen, (_, own) in zip(found, parts, strict=True)):
+        return Chosen(fit, considered)
+    return Chosen(search.joined(fit, tuple(chosen.fit for chosen in found)), considered)
 
 
 def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:

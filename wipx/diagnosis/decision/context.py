@@ -14,6 +14,7 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import Rules
+from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
@@ -51,6 +52,10 @@ class Context:
         levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
         fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
+
+    def beside(self, search: Search) -> "Context":
+        """The same for the part of a robot that a search looks at."""
+        return replace(self, fitter=search.store.fitter, setting=search.store.setting)
 
     def trusting(self, fit: Fit) -> "Context":
         """The same; all models predict from states of the filter from which that of a fit predicts best."""

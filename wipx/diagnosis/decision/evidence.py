@@ -18,6 +18,7 @@ from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.robot_search import search_of
 from wipx.diagnosis.selection.search import Chosen, Search
 
 
@@ -86,7 +87,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     setting, least_gain = context.setting, context.rules.selection.least_gain
     ahead = replace(context, fitter=fitter)
     nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
-    search = Search.of(FitStore.of(fitter, setting, nominal), nominal)
+    search = search_of(FitStore.of(fitter, setting, nominal), nominal)
     criteria = search.criteria
     best = search.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)

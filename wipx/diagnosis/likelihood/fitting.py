@@ -15,7 +15,7 @@ import numpy as np
 
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import EvidenceRules, Rules
 from wipx.sim.analytic import AnalyticSimulator
@@ -203,6 +203,10 @@ class Fitter(ABC):
     @abstractmethod
     def without(self, *recordings: int) -> Self:
         """The same with recordings that do not count."""
+
+    @abstractmethod
+    def beside(self, setting: Setting) -> Self:
+        """The same for a part of the robot, the rest of which is given."""
 
     @abstractmethod
     def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":

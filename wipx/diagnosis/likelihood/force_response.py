@@ -4,8 +4,11 @@ A force that is not in the model moves the state; the observer takes part of tha
 wrongly at the next one is the response (Ljung 1999, System Identification, sec. 3.2).
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from wipx.core.model import Model
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.noise_model import whitened_change
@@ -32,6 +35,28 @@ def motion_of(fitter: InnovationFitter, fit: Fit) -> dict[str, np.ndarray]:
         signals[name] = np.concatenate([commands, commands[-1:]])
     signals["t"] = np.where(data.rows, data.inputs.t, 0.0)
     return signals
+
+
+def drive_force(model: Model, motion: Mapping[str, np.ndarray], joint: str) -> np.ndarray:
+    """Force that the drive of a joint makes of what was commanded, shape (K + 1, R) [N or N m].
+
+    Args:
+        model: Gain and stiffness of the drive; what else is missing at it is left out.
+        motion: By column, see `motion_of`.
+        joint: One that is driven.
+    """
+    plant, p = model.plant, model.parameters
+    site = "actuator" if plant.tree is None else f"actuator_{joint}"
+    gain = model.effects.get(f"{site}/gain", {}).get("k", 1.0)
+    command = motion[plant.commands[plant.actuated.index(joint)]]
+    drive = plant.drives.get(joint)
+    if drive is None:
+        return gain * p["input_gain"] * command
+    if drive.kind == "torque":
+        return gain * p[f"{joint}.gain"] * command
+    column = plant.columns[joint]
+    force = p[f"{joint}.kp"] * (command - motion[column]) - p[f"{joint}.kd"] * motion[f"{column}_dot"]
+    return gain * (force if drive.limit is None else np.clip(force, -drive.limit, drive.limit))
 
 
 def direction(rate: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -120,7 +120,7 @@ class ForecastFitter(Fitter):
     def looks_for(self, name: str, effect: Effect) -> bool:
         """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
         site, machines = name.partition("/")[0], effect.on_machines
-        return not effect.outside_vocabulary or bool(machines and machines(site, self.data.plant))
+        return not effect.is_outside(self.data.plant) or bool(machines and machines(site, self.data.plant))
 
     @property
     def data(self) -> RecordingBatch:
@@ -194,6 +194,10 @@ class ForecastFitter(Fitter):
     def without(self, *recordings: int) -> "ForecastFitter":
         """The same with recordings that do not count."""
         return replace(self, by_row=self.by_row.without(*recordings), _doubts={}, _seen={})
+
+    def beside(self, setting: Setting) -> "ForecastFitter":
+        """The same, with doubt of the part's own numbers."""
+        return replace(self, doubted=setting.doubted(self.rules.forecasts.undeclared), _doubts={}, _seen={})
 
     def first_fit(self, hypothesis: Hypothesis) -> Fit:
         """A first fit of a hypothesis, from starts of its own."""
@@ -326,8 +330,11 @@ class ForecastFitter(Fitter):
     def _near(self, fit: Fit) -> list[np.ndarray]:
         """Bandwidths of a fit, and those three times larger or smaller in some joints."""
         best = fit.levels.bandwidths
-        near = best * np.array(list(product((1.0 / 3.0, 1.0, 3.0), repeat=len(best))))
-        return list(np.unique(np.clip(near, BANDWIDTHS[0], BANDWIDTHS[-1]), axis=0))
+        if self.data.plant.tree is None:
+            factors = np.array(list(product((1.0 / 3.0, 1.0, 3.0), repeat=len(best))))
+        else:
+            factors = np.concatenate([1.0 + (factor - 1.0) * np.eye(len(best)) for factor in (1.0 / 3.0, 1.0, 3.0)])
+        return list(np.unique(np.clip(best * factors, BANDWIDTHS[0], BANDWIDTHS[-1]), axis=0))
 
     def errors_of(self, batch: ModelBatch, levels: PredictionStarts, model: Model) -> np.ndarray:
         """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
@@ -358,8 +365,27 @@ class ForecastFitter(Fitter):
         return TOO_FAR * np.ptp(rows, axis=1) + 1e3 * self.noise
 
     def noise_of(self, errors: np.ndarray, levels: PredictionStarts | None, model: Model) -> list[Errors]:
-        """How each model's errors are distributed, by expectation and maximisation."""
+        """How each model's errors are distributed, those of each group of joints by themselves."""
         some = errors[:, self._counted]
+        whitening = np.zeros((len(some), some.shape[2], some.shape[2]))
+        likelihoods = np.zeros(len(some))
+        for group in self._groups:
+            own, gained = self._distributed(some[:, :, group])
+            whitening[:, group[:, None], group] = own
+            likelihoods += gained
+        return [Errors(w, float(value)) for w, value in zip(whitening, likelihoods, strict=True)]
+
+    @cached_property
+    def _groups(self) -> tuple[np.ndarray, ...]:
+        """Which of the H joints errors of a prediction go with each other, indices."""
+        joints, channels = self.data.joints, self.data.channels
+        first = np.arange(len(self._sampled))[:, None] * joints
+        own = [[channels[c] for c in group if channels[c] < joints] for group in self.data.groups]
+        return tuple((first + np.array(coordinates)).ravel() for coordinates in own)
+
+    @staticmethod
+    def _distributed(some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whitening (P, E, E) and log-likelihood (P,) of E errors of predictions, by expectation and maximisation."""
         count, size = some.shape[1:]
         weights = np.ones(some.shape[:2])
         prior = size + 1.0  # errors' worth of what is known of correlations beforehand: nothing
@@ -373,15 +399,17 @@ class ForecastFitter(Fitter):
             weights = (TAILS + size) / (TAILS + squares)
         determinants = np.log(np.einsum("paa->pa", whitening)).sum(axis=1)
         sums = 0.5 * (TAILS + size) * np.log1p(squares / TAILS).sum(axis=1)
-        likelihoods = SHARE * (count * determinants - sums)
-        return [Errors(w, float(value)) for w, value in zip(whitening, likelihoods, strict=True)]
+        return whitening, SHARE * (count * determinants - sums)
 
     def whitened(self, errors: np.ndarray, noise: Errors) -> np.ndarray:
         """White errors, shape (P, N, H joints), half of whose sum of squares is the loss of likelihood."""
         white = errors @ noise.whitening.T
-        squares = np.maximum(np.sum(white**2, axis=2, keepdims=True), 1e-12)
-        worth = SHARE * (TAILS + white.shape[2]) * np.log1p(squares / TAILS)
-        return white * np.sqrt(worth / squares)
+        for group in self._groups:
+            own = white[:, :, group]
+            squares = np.maximum(np.sum(own**2, axis=2, keepdims=True), 1e-12)
+            worth = SHARE * (TAILS + len(group)) * np.log1p(squares / TAILS)
+            white[:, :, group] = own * np.sqrt(worth / squares)
+        return white
 
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
         """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""

@@ -21,11 +21,17 @@ class Setting:
         nominal: What its owner believes.
         uncertainty: Relative standard deviation of nominal numbers that are not exact.
         scales: Characteristic sizes by site.
+        sites: Where effects are looked for; None for everywhere.
     """
 
     nominal: Model
     uncertainty: Mapping[str, float]
     scales: Mapping[str, Scales]
+    sites: frozenset[str] | None = None
+
+    def looks_at(self, effect: str) -> bool:
+        """Whether an effect "site/kind" is looked for."""
+        return self.sites is None or effect.partition("/")[0] in self.sites
 
     def space(self, effects: tuple[str, ...]) -> ParameterSpace:
         """The numbers that vary when these effects are added: theirs, and the uncertain nominal ones."""
@@ -44,13 +50,28 @@ class Setting:
     def doubted(self, deviation: float) -> "Setting":
         """The same robot, none of whose numbers is quite exact: those of a real machine never are.
 
+        Of a tree, the numbers of the links and joints at which effects are looked for.
+
         Args:
-            deviation: Relative standard deviation of a rigid body's numbers that are given as exact.
+            deviation: Relative standard deviation of a rigid body's numbers that are given as exact; of lengths, by
+                the robot's size.
         """
         if deviation == 0.0:
             return self
-        body = {name: deviation for name, value in self.nominal.parameters.items() if value and name not in GIVEN}
-        return replace(self, uncertainty={**body, **self.uncertainty})
+        plant = self.nominal.plant
+        known = {name: value for name, value in self.nominal.parameters.items() if value and name not in GIVEN}
+        if plant.tree is not None:
+            known = {name: value for name, value in known.items() if self._is_of_these_sites(name.partition(".")[0])}
+        sizes = {name: self._size(name) if plant.parameters[name].absolute else 1.0 for name in known}
+        return replace(self, uncertainty={**{n: deviation * s for n, s in sizes.items()}, **self.uncertainty})
+
+    def _is_of_these_sites(self, owner: str) -> bool:
+        """Whether a joint or a link of a tree is among the sites at which effects are looked for."""
+        return self.sites is not None and bool({owner, f"link_{owner}"} & self.sites)
+
+    def _size(self, name: str) -> float:
+        """Length by which a place on a link is measured [m]."""
+        return self.scales[f"link_{name.partition('.')[0]}"].length
 
 
 @dataclass(frozen=True)

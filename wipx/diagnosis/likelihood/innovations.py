@@ -13,7 +13,7 @@ from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import CONVERGED, Fit, Fitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.noise_model import NoiseModel, noise_model_of, whitened
 from wipx.diagnosis.likelihood.observer import NoiseLevels
@@ -52,8 +52,8 @@ class InnovationFitter(Fitter):
         return self.rules.innovations
 
     def looks_for(self, name: str, effect: Effect) -> bool:
-        """Those of contract section 3."""
-        return not effect.outside_vocabulary
+        """Those of the contract."""
+        return not effect.is_outside(self.data.plant)
 
     @property
     def data(self) -> RecordingBatch:
@@ -89,6 +89,10 @@ class InnovationFitter(Fitter):
         """The same with recordings that do not count."""
         data = replace(self.data, left_out=recordings)
         return replace(self, innovations_model=replace(self.innovations_model, data=data))
+
+    def beside(self, setting: Setting) -> "InnovationFitter":
+        """Itself."""
+        return self
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""

@@ -195,11 +195,7 @@ def _whitened(innovations, counted, lags, surprises, weights, whitening):
                     of_past = weights[d : len(lags) * m : m, c]
                     if of_past.any():
                         _subtract_past(left[c, :count], known[d], lags, of_past)
-                for i in range(SURPRISES):
-                    for d in range(surprises.shape[1]):
-                        weight = weights[len(lags) * m + i * surprises.shape[1] + d, c]
-                        begin = max(first, 1 + i)
-                        _subtract(left[c, begin - first : count], surprises[r, d, begin - 1 - i :], weight)
+                _subtract_surprises(left[c, :count], surprises[r], first, weights[len(lags) * m :, c])
             for c in range(m):
                 for d in range(c + 1):
                     if whitening[c, d] != 0.0:
@@ -214,6 +210,16 @@ def _subtract_past(series, known, lags, weights):
         near, far = known[lags[-1] - lags[i] :], known[lags[-1] - lags[i + 1] :]
         for k in range(len(series)):
             series[k] -= weights[i] * near[k] + weights[i + 1] * far[k]
+
+
+@cached
+def _subtract_surprises(series, surprises, first, weights):
+    """Take from a series, which begins at row `first`, what the commands' surprises foretell."""
+    inputs = len(surprises)
+    for i in range(SURPRISES):
+        for d in range(inputs):
+            begin = max(first, 1 + i)
+            _subtract(series[begin - first :], surprises[d, begin - 1 - i :], weights[i * inputs + d])
 
 
 @cached

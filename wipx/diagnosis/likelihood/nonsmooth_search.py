@@ -15,7 +15,6 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.effects.catalogue import kind_of
 
-DELAY = "actuator/delay"
 WIDTHS = (0.3, 0.3, 0.2, 0.2, 0.12, 0.12, 0.07, 0.04, 0.02)  # of a number's size, in turn
 ALONG = 2.0  # times that, along the ridge
 LONGEST = 0.04  # [s] of a delay that is guessed closely; longer ones must show from afar
@@ -53,13 +52,19 @@ def hides(fit: Fit, effect: str) -> bool:
     return bool(_hiding(fit, effect))
 
 
-def delays(fitter: Fitter, begin: Hypothesis, levels: NoiseLevels) -> list[Hypothesis]:
-    """A hypothesis with the delays of the drive at which its likelihood has the highest peaks."""
+def is_drive_delay(effect: str) -> bool:
+    """Whether an effect is the delay of one or all drives."""
+    site, _, kind = effect.partition("/")
+    return kind == "delay" and site.startswith("actuator")
+
+
+def delays(fitter: Fitter, begin: Hypothesis, effect: str, levels: NoiseLevels) -> list[Hypothesis]:
+    """A hypothesis with the delays of a drive at which its likelihood has the highest peaks."""
     intervals = fitter.data.intervals
     row = max(float(np.median(intervals[intervals > 0.0])), FASTEST)
     guesses = np.arange(row, max(PER_ROW * LONGEST, 2.0 * row), row) / PER_ROW
     values = np.repeat(begin.space.to_values(begin.cube[None]), len(guesses), axis=0)
-    values[:, begin.parameters_of(DELAY)[0]] = guesses
+    values[:, begin.parameters_of(effect)[0]] = guesses
     tried = [begin.at(cube) for cube in begin.space.to_cube(values)]
     parts = [tried[i : i + TOGETHER] for i in range(0, len(tried), TOGETHER)]
     found = np.concatenate([fitter.likelihoods_of(part, levels) for part in parts])

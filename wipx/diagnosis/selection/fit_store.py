@@ -153,9 +153,11 @@ class FitStore:
         begins = [Hypothesis.of(self.setting, effects, each) for each in values]
         levels = self.fitter.spread_for(begins[0].model, fit.levels)
         count = STARTS
-        if starts[0].effect == nonsmooth_search.DELAY:
+        if nonsmooth_search.is_drive_delay(starts[0].effect):
             begins += [
-                guess for begin in begins[:: len(own)] for guess in nonsmooth_search.delays(self.fitter, begin, levels)
+                guess
+                for begin in begins[:: len(own)]
+                for guess in nonsmooth_search.delays(self.fitter, begin, starts[0].effect, levels)
             ]
             count = nonsmooth_search.PEAKS
         likeliest = self.fitter.likeliest(begins, levels, count)

@@ -73,9 +73,13 @@ class Search:
         """The fit of the nominal model."""
         return self.criteria.nominal
 
-    def run(self) -> Chosen:
-        """The fit of the effects that are missing; `nominal` where none is."""
-        current, best = self.nominal, self.first
+    def run(self, begin: Fit | None = None) -> Chosen:
+        """The fit of the effects that are missing; `nominal` where none is.
+
+        Args:
+            begin: A fit whose effects are the first ones; None for none.
+        """
+        current, best = (begin, None) if begin is not None and begin.effects else (self.nominal, self.first)
         considered: History = ()
         seen, fleeting = set[frozenset[str]](), set[frozenset[str]]()
         while len(current.effects) < self.rules.most_effects and frozenset(current.effects) not in seen:
@@ -108,6 +112,14 @@ class Search:
             considered += _step(current, extended, best, fleeting) + pruned.considered
             current = pruned.fit
         return self.exchanged(current).after(considered)
+
+    def split(self, fit: Fit) -> "tuple[tuple[Search, Fit], ...]":
+        """The searches by which a robot is searched part by part, and the fit as each sees it: itself."""
+        return ((self, fit),)
+
+    def joined(self, fit: Fit, parts: tuple[Fit, ...]) -> Fit:
+        """The fit of a robot, with the effects that its parts have now."""
+        return parts[0]
 
     def preferred(self, fits: list[Fit], base: Fit) -> Fit | None:
         """The fit with the most evidence beyond a base, or a simpler one that is as good."""

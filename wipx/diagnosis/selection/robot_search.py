@@ -1,0 +1,190 @@
+"""A robot of many joints searched part by part.
+
+On an arm every joint has friction. Effects of different joints hardly compete: what one joint lacks, the observer takes
+for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
+has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
+whose effects act on several joints at once, are one more part. Then all numbers are fitted together, what the others
+make superfluous is dropped, and the next sweep begins, until one changes nothing.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from wipx.core.plant import Plant
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.held_out import HeldOut
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.selection.criteria import Criteria, evidence
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
+
+SWEEPS = 4  # at most
+
+
+def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
+    """Sites of the parts of a robot: links, base and what all drives share; then each joint, its drive, its sensor."""
+    joints = tuple(
+        frozenset({joint, f"actuator_{joint}", f"sensor_{column}"}) for joint, column in plant.columns.items()
+    )
+    return (frozenset(plant.sites).difference(*joints), *joints)
+
+
+def expected_loss(fit: Fit, effect: str) -> float:
+    """What a fit would lose without an effect, were its likelihood a parabola (Wald 1943) [nats]."""
+    indices = fit.hypothesis.parameters_of(effect)
+    space = fit.hypothesis.space
+    shift = (fit.hypothesis.cube - space.neutral)[indices]
+    own = np.linalg.pinv(fit.information)[np.ix_(indices, indices)]
+    return 0.5 * float(shift @ np.linalg.solve(own + 1e-15 * np.eye(len(own)), shift))
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a robot has outside of the part that is searched.
+
+    Attributes:
+        effects: All that have been found, those of the part included.
+        values: Numbers of these effects, and uncertain ones of the robot [SI].
+        levels: What fits hold fixed.
+        extra: What the model has beside them: effects of the owner's model, and curves that stand in for what is left.
+    """
+
+    effects: tuple[str, ...]
+    values: Mapping[str, float]
+    levels: Any
+    extra: Mapping[str, Mapping[str, float]]
+
+    @classmethod
+    def of(cls, fit: Fit) -> "Held":
+        """That of a fit."""
+        found = fit.hypothesis.model.effects
+        return cls(
+            fit.effects,
+            fit.hypothesis.values,
+            fit.levels,
+            {name: values for name, values in found.items() if name not in fit.effects},
+        )
+
+    def with_part(self, sites: frozenset[str], fit: Fit) -> "Held":
+        """The same with what a fit has found at the sites of a part."""
+        others = tuple(effect for effect in self.effects if _site(effect) not in sites)
+        return replace(
+            self, effects=(*others, *fit.effects), values={**self.values, **fit.hypothesis.values}, levels=fit.levels
+        )
+
+
+def _site(effect: str) -> str:
+    return effect.partition("/")[0]
+
+
+@dataclass(frozen=True)
+class RobotSearch(Search):
+    """The search for the missing effects of a robot, part by part."""
+
+    _known: dict[tuple[int, frozenset[str]], tuple[Fit, Search, Fit]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+
+    @classmethod
+    def of(cls, store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> "RobotSearch":
+        """A search that begins at the nominal model."""
+        return cls(store, Criteria(store.fitter, nominal), None, held_out)
+
+    @property
+    def plant(self) -> Plant:
+        """The robot's."""
+        return self.store.setting.nominal.plant
+
+    def run(self, begin: Fit | None = None) -> Chosen:
+        """The fit of the effects that are missing; `nominal` where none is."""
+        whole, considered = begin or self.nominal, History()
+        seen = set[frozenset[str]]()
+        while len(seen) < SWEEPS and frozenset(whole.effects) not in seen:
+            seen.add(frozenset(whole.effects))
+            swept = self._swept(whole)
+            whole, considered = swept.fit, considered + swept.considered
+        return Chosen(whole, considered)
+
+    def exchanged(self, fit: Fit) -> Chosen:
+        """Every part searched again, from the effects of a fit on."""
+        return self.run(fit)
+
+    def pruned(self, fit: Fit) -> Chosen:
+        """Without the effects that those of other parts make superfluous, the weakest first."""
+        losses = {effect: expected_loss(fit, effect) for effect in fit.effects}
+        for effect in sorted(losses, key=lambda each: losses[each]) if len(losses) > 1 else ():
+            rest = Hypothesis.of(self.store.setting, tuple(e for e in fit.effects if e != effect), {})
+            if losses[effect] > DOUBTED * self.criteria.required_gain(replace(fit, hypothesis=rest), fit):
+                continue
+            smaller = self.store.without(fit, effect)
+            if not self.criteria.gains_enough(smaller, fit):
+                considered = ConsideredEffect(effect, evidence(smaller, fit), False, "superfluous beside other joints'")
+                return self.pruned(smaller).after((considered,))
+        return Chosen(fit)
+
+    def split(self, fit: Fit) -> tuple[tuple[Search, Fit], ...]:
+        """The searches of the parts that have effects, and the fit as each of them sees it."""
+        parts = [sites for sites in parts_of(self.plant) if any(_site(effect) in sites for effect in fit.effects)]
+        return tuple(self._part(fit, sites) for sites in parts)
+
+    def joined(self, fit: Fit, parts: tuple[Fit, ...]) -> Fit:
+        """The fit of a robot, with the effects that its parts have now."""
+        held = Held.of(fit)
+        for part, (search, _) in zip(parts, self.split(fit), strict=True):
+            assert search.store.setting.sites is not None
+            held = held.with_part(search.store.setting.sites, part)
+        return self._together(held)
+
+    def _swept(self, whole: Fit) -> Chosen:
+        """One search of every part, and the fit of all that they found."""
+        held, considered = Held.of(whole), History()
+        for sites in parts_of(self.plant):
+            search, begin = self._beside(held, sites)
+            found = search.run(begin)
+            held, considered = held.with_part(sites, found.fit), considered + found.considered
+        return self.pruned(self._together(held)).after(considered)
+
+    def _together(self, held: Held) -> Fit:
+        """The fit of all effects, from the values of the parts on."""
+        hypothesis = Hypothesis.of(self.store.setting, held.effects, held.values)
+        return self.store.keep(self.store.fitter.converged(self.store.fitter.fit(hypothesis, held.levels)))
+
+    def _part(self, fit: Fit, sites: frozenset[str]) -> tuple[Search, Fit]:
+        """The search of a part beside a fit, and the fit as it sees it."""
+        key = (id(fit), sites)
+        if key not in self._known:
+            self._known[key] = (fit, *self._beside(Held.of(fit), sites))
+        return self._known[key][1:]
+
+    def _beside(self, held: Held, sites: frozenset[str]) -> tuple[Search, Fit]:
+        """The search of a part beside what the robot has elsewhere, and the fit where it begins."""
+        whole = self.store.setting
+        own = tuple(effect for effect in held.effects if _site(effect) in sites)
+        given: dict[str, dict[str, float]] = {name: dict(values) for name, values in held.extra.items()}
+        for name, value in held.values.items():
+            effect, _, symbol = name.rpartition(".")
+            if effect in held.effects and effect not in own:
+                given.setdefault(effect, {})[symbol] = value
+        setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
+        fitter = self.store.fitter.beside(setting)
+        nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
+        store = FitStore.of(fitter, setting, nominal)
+        if not own:
+            return Search.of(store, nominal, self.held_out), nominal
+        fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
+        return Search(store, Criteria(fitter, nominal), None, self.held_out), fit
+
+
+def search_of(store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> Search:
+    """The search that suits a robot: over all its sites at once, or part by part for a tree.
+
+    Args:
+        store: Of fits.
+        nominal: The fit of the nominal model.
+        held_out: Judges whether many effects transfer to held-out recordings; None if nobody asks.
+    """
+    kind = Search if store.setting.nominal.plant.tree is None else RobotSearch
+    return kind.of(store, nominal, held_out)
