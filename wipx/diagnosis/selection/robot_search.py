@@ -3,8 +3,8 @@
 On an arm every joint has friction. Effects of different joints hardly compete: what one joint lacks, the observer takes
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
-whose effects act on several joints at once, are one more part. Then all numbers are fitted together, what the others
-make superfluous is dropped, and the next sweep begins, until one changes nothing.
+whose effects act on several joints at once, are one more part. A part is searched again when another one has changed.
+At last all numbers are fitted together, and what the effects of other parts make superfluous is dropped.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
 
-SWEEPS = 4  # at most
+SWEEPS = 4  # searches of a part, at most
 
 
 def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
@@ -81,6 +81,15 @@ def _site(effect: str) -> str:
 
 
 @dataclass(frozen=True)
+class PartSearch(Search):
+    """The search for the missing effects of one part."""
+
+    def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
+        """Whether it gains half of what it must: less, in one of many parts, is mostly chance."""
+        return evidence(current, one) >= 0.5 * self.criteria.required_gain(current, one)
+
+
+@dataclass(frozen=True)
 class RobotSearch(Search):
     """The search for the missing effects of a robot, part by part."""
 
@@ -101,12 +110,33 @@ class RobotSearch(Search):
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
         whole, considered = begin or self.nominal, History()
-        seen = set[frozenset[str]]()
-        while len(seen) < SWEEPS and frozenset(whole.effects) not in seen:
-            seen.add(frozenset(whole.effects))
-            swept = self._swept(whole)
-            whole, considered = swept.fit, considered + swept.considered
+        order = self._order(whole)
+        left = dict.fromkeys(order, SWEEPS)
+        waiting = list(order)
+        while waiting:
+            held = Held.of(whole)
+            while waiting:
+                sites = waiting.pop(0)
+                left[sites] -= 1
+                search, begun = self._beside(held, sites)
+                found = search.run(begun)
+                held, considered = held.with_part(sites, found.fit), considered + found.considered
+                if set(found.fit.effects) != set(begun.effects):
+                    others = [part for part in order if part != sites and part not in waiting and left[part]]
+                    waiting += others
+            kept = self.pruned(self._together(held))
+            whole, considered = kept.fit, considered + kept.considered
+            if len(whole.effects) < len(held.effects):
+                waiting = [part for part in order if left[part]]
         return Chosen(whole, considered)
+
+    def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
+        """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
+        rest, *joints = parts_of(self.plant)
+        scales = self.store.setting.scales
+        by_row = self.store.fitter.sketched_by_row(fit)[1].levels
+        usual = np.array([scales[site].force for site in self.plant.joints])
+        return (rest, *(joints[j] for j in np.argsort(-by_row.force / usual)))
 
     def exchanged(self, fit: Fit) -> Chosen:
         """Every part searched again, from the effects of a fit on."""
@@ -138,15 +168,6 @@ class RobotSearch(Search):
             held = held.with_part(search.store.setting.sites, part)
         return self._together(held)
 
-    def _swept(self, whole: Fit) -> Chosen:
-        """One search of every part, and the fit of all that they found."""
-        held, considered = Held.of(whole), History()
-        for sites in parts_of(self.plant):
-            search, begin = self._beside(held, sites)
-            found = search.run(begin)
-            held, considered = held.with_part(sites, found.fit), considered + found.considered
-        return self.pruned(self._together(held)).after(considered)
-
     def _together(self, held: Held) -> Fit:
         """The fit of all effects, from the values of the parts on."""
         hypothesis = Hypothesis.of(self.store.setting, held.effects, held.values)
@@ -173,9 +194,9 @@ class RobotSearch(Search):
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
         store = FitStore.of(fitter, setting, nominal)
         if not own:
-            return Search.of(store, nominal, self.held_out), nominal
+            return PartSearch.of(store, nominal, self.held_out), nominal
         fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
-        return Search(store, Criteria(fitter, nominal), None, self.held_out), fit
+        return PartSearch(store, Criteria(fitter, nominal), None, self.held_out), fit
 
 
 def search_of(store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> Search:

@@ -198,12 +198,16 @@ class Search:
             return True
         return self.held_out.transfers(fitter, smaller, larger)
 
+    def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
+        """Whether an effect that is not worth it alone gains enough for a second one to be sought beside it."""
+        return one.log_likelihood - current.log_likelihood >= self.rules.worth_pairing
+
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
         if len(current.effects) + 2 > self.store.fitter.own_rules.unproven:
             return None
         for one in extended[:PAIRED]:
-            if one.log_likelihood - current.log_likelihood >= self.rules.worth_pairing:
+            if self.is_worth_pairing(current, one):
                 two = self.preferred(self.store.extensions(one), current)
                 if two is not None and self.criteria.gains_enough(current, two):
                     return two
