@@ -34,8 +34,19 @@ _PLACES_OF_PLANT = MappingProxyType(
 
 
 def site_in_words(site: str, plant_kind: str) -> str:
-    """A site of a plant, e.g. "the rail joint" for "translation" of a wip."""
+    """A site of a plant, e.g. "the rail joint" for "translation" of a wip, "the drive of elbow" for a robot."""
+    if plant_kind == "robot":
+        return _place_on_robot(site)
     return _PLACES_OF_PLANT.get((plant_kind, site), _PLACES.get(site, site.replace("_", " ")))
+
+
+def _place_on_robot(site: str) -> str:
+    """A site of a robot from a model file; joints and links keep their names."""
+    first, _, name = site.partition("_")
+    whole = {"actuator": "all drives", "environment": "the base"}
+    if site in whole or not name:
+        return whole.get(site, site)
+    return {"actuator": f"the drive of {name}", "sensor": f"the sensor of {name}", "link": name}.get(first, site)
 
 
 def effect_in_words(name: str, plant_kind: str) -> str:

@@ -22,10 +22,12 @@ from wipx.report.diagnosis_words import (
     remainder_sentences,
     unexplained_sentence,
 )
+from wipx.report.drawing import svg
 from wipx.report.estimates import marked_rows
 from wipx.report.files import write_whole
 from wipx.report.html import render
 from wipx.report.outcome import judged_errors, signal_errors, windows_by_part
+from wipx.report.robot_picture import robot_picture
 
 PLAIN_CANDIDATES = 10  # beside the chosen ones; the others are folded away
 
@@ -63,6 +65,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             "effects": effect_rows(diagnosis),
             "suspects": suspect_rows(diagnosis),
             "sites": site_bars(diagnosis),
+            "picture": _picture(diagnosis),
             "places": [
                 *(region_sentence(region, diagnosis.units) for region in location.regions),
                 *(period_sentence(period) for period in location.times),
@@ -79,3 +82,13 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             "model_rows": model_rows(diagnosis),
         },
     )
+
+
+def _picture(diagnosis: Diagnosis) -> str:
+    """A robot from a model file in the middle of its first recording, with the mismatch coloured; empty for others."""
+    tree = diagnosis.model.plant.tree
+    if tree is None:
+        return ""
+    recorded = diagnosis.traces[0].recorded if diagnosis.traces else {}
+    posture = {joint: float(values[len(values) // 2]) for joint, values in recorded.items()}
+    return svg(robot_picture(tree, posture, dict(diagnosis.location.sites)))

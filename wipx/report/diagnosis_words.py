@@ -23,6 +23,7 @@ PLANTS = MappingProxyType(
         "pendulum": "pendulum",
         "linear_axis": "linear axis",
         "double_pendulum": "double pendulum",
+        "robot": "robot from a model file",
     }
 )
 SURE = 0.999  # probabilities beyond are not told apart

@@ -18,10 +18,11 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
     """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
     plant = fitter.data.plant
     steady = effect_of(effect, plant).steady
-    if steady is None:
-        return None
     site = effect.partition("/")[0]
-    joint = plant.joints.index(site if site in plant.joints else plant.actuated[0])
+    drive = plant.drives.get(plant.joint_at(site))
+    if steady is None or (steady.over == "command" and drive is not None and drive.kind != "torque"):
+        return None
+    joint = plant.joints.index(plant.joint_at(site))
     signal = _signal(steady, joint, fitter)
     shape = next((s for s in shapes if s.kind == "force" and (s.joint, s.signal) == (joint, signal)), None)
     if shape is None:
@@ -49,7 +50,7 @@ def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
         return plant.rates[joint]
     if steady.over == "coordinate":
         return plant.coordinates[joint]
-    return plant.commands[0 if len(plant.commands) == 1 else joint]
+    return plant.commands[plant.actuated.index(plant.joints[joint])]
 
 
 def _abscissa(low: float, high: float) -> np.ndarray:
@@ -71,13 +72,16 @@ def added_force(model: Model, effect: str, at: np.ndarray) -> np.ndarray:
     if steady.over != "command":
         return steady.force(at, model.effects[effect], model.parameters)
     without = {name: values for name, values in model.effects.items() if name != effect}
-    return _driven(model, at) - _driven(Model(model.plant, model.parameters, without), at)
+    site = effect.partition("/")[0]
+    return _driven(model, site, at) - _driven(Model(model.plant, model.parameters, without), site, at)
 
 
-def _driven(model: Model, command: np.ndarray) -> np.ndarray:
-    """Force of the drive at constant commands, shape (N,) [N or N m]."""
-    force = command * model.parameters["input_gain"]
-    laws = [(steady, values) for name, values in model.effects.items() if (steady := kind_of(name).steady) is not None]
+def _driven(model: Model, site: str, command: np.ndarray) -> np.ndarray:
+    """Force of the drive at a site, at constant commands, shape (N,) [N or N m]."""
+    joint = model.plant.joint_at(site)
+    force = command * model.parameters["input_gain" if model.plant.tree is None else f"{joint}.gain"]
+    own = {name: values for name, values in model.effects.items() if name.partition("/")[0] == site}
+    laws = [(steady, values) for name, values in own.items() if (steady := kind_of(name).steady) is not None]
     for steady, values in sorted(laws, key=lambda law: law[0].stage):
         if steady.over == "command":
             force = force + steady.force(force, values, model.parameters)

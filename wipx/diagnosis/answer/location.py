@@ -48,7 +48,8 @@ def located(
     regions = _named_regions(effects, signals, excess, data) or _found_regions(
         signals, excess, data, fitter.rules.answer
     )
-    return Location(_sites(effects, rest), regions, _periods(effects, excess, data), _map(data, signals, excess))
+    sites = _sites(effects, rest)
+    return Location(sites, regions, _periods(effects, excess, data), _map(data, sites, signals, excess))
 
 
 def _sites(effects: tuple[FoundEffect, ...], rest: str | None) -> Mapping[str, float]:
@@ -134,9 +135,11 @@ def _interval(name: str, values: np.ndarray, excess: np.ndarray, rules: AnswerRu
     return best
 
 
-def _map(data: RecordingBatch, signals: Mapping[str, np.ndarray], excess: np.ndarray) -> ErrorMap:
+def _map(
+    data: RecordingBatch, sites: Mapping[str, float], signals: Mapping[str, np.ndarray], excess: np.ndarray
+) -> ErrorMap:
     plant = data.plant
-    names = _axes(plant)
+    names = _axes(plant, sites)
     counted = data.counted
     values = [signals[name][counted] for name in names]
     ends = [np.quantile(v, (0.002, 0.998)) for v in values]
@@ -163,7 +166,8 @@ def _map(data: RecordingBatch, signals: Mapping[str, np.ndarray], excess: np.nda
     )
 
 
-def _axes(plant: Plant) -> tuple[str, str]:
-    """The driven joint's coordinate and rate."""
-    joint = plant.joints.index(plant.actuated[0])
+def _axes(plant: Plant, sites: Mapping[str, float]) -> tuple[str, str]:
+    """Coordinate and rate of the driven joint; of a tree, of the joint with the largest share of the mismatch."""
+    site = plant.actuated[0] if plant.tree is None else max(sites, key=lambda each: sites[each])
+    joint = plant.joints.index(plant.joint_at(site))
     return plant.coordinates[joint], plant.rates[joint]

@@ -44,10 +44,11 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) 
         waves = [np.concatenate([np.cos(part * angle), np.sin(part * angle)]) for angle in angles]
         slopes = sum(response(fitter, fit, j, wave) for j, wave in zip(joints, waves, strict=True))
         slopes = slopes - basis @ (basis.T @ slopes)
+        normal, score = slopes.T @ slopes, slopes.T @ left
         for i in range(part.size):
-            pair = slopes[:, [i, i + part.size]]
-            force = -np.linalg.solve(pair.T @ pair + REGULARISATION * np.eye(2), pair.T @ left)
-            found.append((-0.5 * float(left @ (pair @ force)), np.hypot(*force), np.arctan2(-force[1], force[0])))
+            pair = [i, i + part.size]
+            force = -np.linalg.solve(normal[np.ix_(pair, pair)] + REGULARISATION * np.eye(2), score[pair])
+            found.append((-0.5 * float(score[pair] @ force), np.hypot(*force), np.arctan2(-force[1], force[0])))
     gains, amplitudes, phases = np.array(found).T
     best: list[int] = []
     for i in np.argsort(-gains):

@@ -5,6 +5,8 @@ What is preferred is decided elsewhere (`criteria`, `search`).
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from wipx.diagnosis.candidates.screening import Candidate, candidates_beside, candidates_of_effect, unscaled
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
@@ -26,18 +28,20 @@ class FitStore:
     Attributes:
         fitter: Fits hypotheses.
         setting: The robot.
+        least: Expected gain below which an effect is not fitted, whatever the kind of evidence has for it [nats].
     """
 
     fitter: Fitter
     setting: Setting
+    least: float = -np.inf
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
     _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, fitter: Fitter, setting: Setting, nominal: Fit) -> "FitStore":
+    def of(cls, fitter: Fitter, setting: Setting, nominal: Fit, least: float = -np.inf) -> "FitStore":
         """A store that holds the fit of the nominal model."""
-        return cls(fitter, setting, {frozenset(nominal.effects): nominal})
+        return cls(fitter, setting, least, {frozenset(nominal.effects): nominal})
 
     def keep(self, fit: Fit) -> Fit:
         """Keep a fit as the best of its effects, and return it."""
@@ -132,7 +136,7 @@ class FitStore:
             by_effect.setdefault(candidate.effect, []).append(candidate)
         best = max((ranked[0].gain if ranked else 0.0), 0.0)
         rules = self.fitter.own_rules
-        least = max(rules.promising * best, rules.worthless)
+        least = max(rules.promising * best, rules.worthless, self.least)
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
         fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]

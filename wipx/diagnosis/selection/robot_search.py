@@ -22,6 +22,7 @@ from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
 
 SWEEPS = 4  # searches of a part, at most
+HALF = 0.5  # of what an effect must gain, below which a part neither fits it nor pairs it
 
 
 def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
@@ -85,8 +86,8 @@ class PartSearch(Search):
     """The search for the missing effects of one part."""
 
     def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
-        """Whether it gains half of what it must: less, in one of many parts, is mostly chance."""
-        return evidence(current, one) >= 0.5 * self.criteria.required_gain(current, one)
+        """Whether it gains half of what it must: two that do not feign each other share what they gain."""
+        return evidence(current, one) >= HALF * self.criteria.required_gain(current, one)
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,9 @@ class RobotSearch(Search):
         setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
         fitter = self.store.fitter.beside(setting)
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
-        store = FitStore.of(fitter, setting, nominal)
+        # An effect of which less is expected, in one of many parts, is mostly chance.
+        least = HALF * (fitter.rules.selection.least_gain + 0.5 * float(np.log(nominal.rows)))
+        store = FitStore.of(fitter, setting, nominal, least)
         if not own:
             return PartSearch.of(store, nominal, self.held_out), nominal
         fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
