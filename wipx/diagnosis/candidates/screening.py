@@ -34,6 +34,7 @@ SCANS: dict[str, Scan] = {
     "speed_limits": speed_limits,
     "gaps": plays,
 }  # first guesses that take more than a grid, by `Effect.scan`
+LOUD = (saturations, speed_limits, plays)  # of effects without which an observer asks a joint for much force
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,8 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
     scan = SCANS[effect.scan] if effect.scan else None
+    if scan in LOUD and setting.sites is not None and _is_quiet(fitter, setting, fit, name):
+        return []
     atoms = (
         perturbations(effect, setting.scales[name.partition("/")[0]])
         if scan is None
@@ -140,6 +143,14 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
             start = dict(zip(names, values.tolist(), strict=True))
             found.append(Candidate(name, float(gain), start, float(estimate), float(deviation)))
     return found
+
+
+def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
+    """Whether the observer asks the joint of an effect for no force to speak of, beside those of the fit's laws."""
+    plant = setting.nominal.plant
+    joint = plant.joint_at(name.partition("/")[0])
+    level = fitter.sketched_by_row(fit)[1].levels.force[plant.joints.index(joint)]
+    return bool(level <= fitter.rules.trust.quiet * setting.scales[joint].force)
 
 
 def _scanned(scan: Scan, fitter: Fitter, fit: Fit, name: str) -> np.ndarray:

@@ -19,6 +19,8 @@ from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
 
+TREE_STEP = 2.0  # times the simulator's usual step, in which robots of many joints are followed
+
 
 @dataclass(frozen=True)
 class Context:
@@ -50,7 +52,8 @@ class Context:
         noise = sensor_noise(recordings, plant)
         rates = [_rate_noise(recordings, plant.rates[c - data.joints]) for c in data.channels if c >= data.joints]
         levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
-        fitter = InnovationFitter(InnovationsModel.of(simulator, data, setting.nominal), rules)
+        engine = simulator if plant.tree is None else replace(simulator, step=TREE_STEP * simulator.step)
+        fitter = InnovationFitter(InnovationsModel.of(engine, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
 
     def beside(self, search: Search) -> "Context":

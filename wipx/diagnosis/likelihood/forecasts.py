@@ -131,7 +131,7 @@ class ForecastFitter(Fitter):
     def simulator(self) -> AnalyticSimulator:
         """The engine, with longer steps."""
         by_row = self.by_row.simulator
-        return replace(by_row, step=by_row.step * STEP)
+        return by_row if self.data.plant.tree is not None else replace(by_row, step=by_row.step * STEP)
 
     @property
     def noise(self) -> np.ndarray:

@@ -38,6 +38,11 @@ class FitStore:
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
     _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
 
+    @property
+    def rounds(self) -> int:
+        """Of noise and values in turn, by which rivals are compared: one in each of many parts."""
+        return 4 if self.setting.sites is None else 1
+
     @classmethod
     def of(cls, fitter: Fitter, setting: Setting, nominal: Fit, least: float = -np.inf) -> "FitStore":
         """A store that holds the fit of the nominal model."""
@@ -145,7 +150,7 @@ class FitStore:
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
             close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
-            polished.append(self.fitter.converged(found) if close else found)
+            polished.append(self.fitter.converged(found, rounds=self.rounds) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -score(f, fit))

@@ -111,25 +111,32 @@ class RobotSearch(Search):
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
         whole, considered = begin or self.nominal, History()
-        order = self._order(whole)
-        left = dict.fromkeys(order, SWEEPS)
-        waiting = list(order)
-        while waiting:
-            held = Held.of(whole)
-            while waiting:
-                sites = waiting.pop(0)
-                left[sites] -= 1
+        waiting = self._order(whole)
+        for _ in range(SWEEPS):
+            held, changed = Held.of(whole), []
+            for sites in waiting:
                 search, begun = self._beside(held, sites)
                 found = search.run(begun)
                 held, considered = held.with_part(sites, found.fit), considered + found.considered
-                if set(found.fit.effects) != set(begun.effects):
-                    others = [part for part in order if part != sites and part not in waiting and left[part]]
-                    waiting += others
+                changed += [sites] if set(found.fit.effects) != set(begun.effects) else []
+            if not changed:
+                break
             kept = self.pruned(self._together(held))
             whole, considered = kept.fit, considered + kept.considered
-            if len(whole.effects) < len(held.effects):
-                waiting = [part for part in order if left[part]]
+            waiting = self._again(whole, changed)
         return Chosen(whole, considered)
+
+    def _again(self, whole: Fit, changed: list[frozenset[str]]) -> tuple[frozenset[str], ...]:
+        """Parts that are searched again: those with effects beside a part that changed later, and promising ones."""
+        promising = {_site(each.effect) for each in self.store.candidates_for(whole) if each.gain > self._least(whole)}
+        found = {_site(effect) for effect in whole.effects}
+        parts = self._order(whole)
+        alone = changed[0] if len(changed) == 1 else None
+        return tuple(part for part in parts if promising & part or (found & part and part != alone))
+
+    def _least(self, fit: Fit) -> float:
+        """Expected gain of an effect below which it is, in one of many parts, mostly chance [nats]."""
+        return HALF * (self.rules.least_gain + 0.5 * float(np.log(fit.rows)))
 
     def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
         """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
@@ -193,9 +200,7 @@ class RobotSearch(Search):
         setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
         fitter = self.store.fitter.beside(setting)
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
-        # An effect of which less is expected, in one of many parts, is mostly chance.
-        least = HALF * (fitter.rules.selection.least_gain + 0.5 * float(np.log(nominal.rows)))
-        store = FitStore.of(fitter, setting, nominal, least)
+        store = FitStore.of(fitter, setting, nominal, self._least(nominal))
         if not own:
             return PartSearch.of(store, nominal, self.held_out), nominal
         fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
