@@ -57,7 +57,16 @@ def test_named_effects_are_identified_and_predict(program, robot: Path, tmp_path
     assert all(seen["rms"][joint] < 0.2 * seen["rms_nominal"][joint] for joint in ("shoulder", "wrist"))
 
 
-@pytest.mark.parametrize("refused", ["task=diagnose", "task=baseline"])
+@pytest.mark.slow
+def test_a_diagnosis_names_what_is_hidden_at_every_joint(program, robot: Path, tmp_path: Path):
+    answer = program("task=diagnose", f"recordings.path={robot}", "hydra.run.dir=out")
+    assert (answer.status, answer.error) == (0, "")
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    assert {effect["name"] for effect in found["effects"]} == set(HIDDEN)
+    assert set(found["location"]["sites"]) == {"shoulder", "actuator_elbow", "wrist"}
+
+
+@pytest.mark.parametrize("refused", ["task=baseline"])
 def test_what_cannot_be_done_yet_is_refused_in_one_line(program, robot: Path, refused: str):
     answer = program(refused, f"recordings.path={robot}", "hydra.run.dir=out")
     assert answer.status == 2

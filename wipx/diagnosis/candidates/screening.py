@@ -115,7 +115,7 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
     scan = SCANS[effect.scan] if effect.scan else None
-    if scan in LOUD and setting.sites is not None and _is_quiet(fitter, setting, fit, name):
+    if scan in LOUD and setting.nominal.plant.tree is not None and _is_quiet(fitter, setting, fit, name):
         return []
     atoms = (
         perturbations(effect, setting.scales[name.partition("/")[0]])

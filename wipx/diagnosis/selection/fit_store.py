@@ -19,6 +19,7 @@ LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 FITTED_TO_THE_END = 3  # effects for which they are, at most
+HALF = 0.5  # of what an effect must gain
 
 
 @dataclass(frozen=True)
@@ -28,25 +29,31 @@ class FitStore:
     Attributes:
         fitter: Fits hypotheses.
         setting: The robot.
-        least: Expected gain below which an effect is not fitted, whatever the kind of evidence has for it [nats].
+        nominal: The fit without any effect.
     """
 
     fitter: Fitter
     setting: Setting
-    least: float = -np.inf
+    nominal: Fit
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
     _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
 
-    @property
-    def rounds(self) -> int:
-        """Of noise and values in turn, by which rivals are compared: one in each of many parts."""
-        return 4 if self.setting.sites is None else 1
-
     @classmethod
-    def of(cls, fitter: Fitter, setting: Setting, nominal: Fit, least: float = -np.inf) -> "FitStore":
+    def of(cls, fitter: Fitter, setting: Setting, nominal: Fit) -> "FitStore":
         """A store that holds the fit of the nominal model."""
-        return cls(fitter, setting, least, {frozenset(nominal.effects): nominal})
+        return cls(fitter, setting, nominal, {frozenset(nominal.effects): nominal})
+
+    @property
+    def is_of_part(self) -> bool:
+        """Whether effects are looked for at some of the sites only: what is considered there is mostly chance."""
+        return self.setting.sites is not None
+
+    def least_expected(self, fit: Fit) -> float:
+        """Expected gain below which an effect of one of many parts is not worth a fit: half of what it must gain."""
+        explained = max(evidence(self.nominal, fit), 0.0)
+        required = self.fitter.required_beyond_penalty(fit, fit, explained)
+        return HALF * (max(self.fitter.rules.selection.least_gain, required) + 0.5 * float(np.log(fit.rows)))
 
     def keep(self, fit: Fit) -> Fit:
         """Keep a fit as the best of its effects, and return it."""
@@ -141,7 +148,9 @@ class FitStore:
             by_effect.setdefault(candidate.effect, []).append(candidate)
         best = max((ranked[0].gain if ranked else 0.0), 0.0)
         rules = self.fitter.own_rules
-        least = max(rules.promising * best, rules.worthless, self.least)
+        least = max(rules.promising * best, rules.worthless)
+        if self.is_of_part:
+            least = max(least, self.least_expected(fit))
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
         fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
@@ -150,7 +159,7 @@ class FitStore:
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
             close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
-            polished.append(self.fitter.converged(found, rounds=self.rounds) if close else found)
+            polished.append(self.fitter.converged(found, rounds=1 if self.is_of_part else 4) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -score(f, fit))
@@ -161,7 +170,7 @@ class FitStore:
         values = [{**others, **start} for others in nonsmooth_search.beside(fit, starts[0].effect) for start in own]
         begins = [Hypothesis.of(self.setting, effects, each) for each in values]
         levels = self.fitter.spread_for(begins[0].model, fit.levels)
-        count = STARTS
+        count = 1 if self.is_of_part else STARTS
         if nonsmooth_search.is_drive_delay(starts[0].effect):
             begins += [
                 guess

@@ -18,11 +18,10 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
-from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.fit_store import HALF, FitStore
 from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
 
 SWEEPS = 4  # searches of a part, at most
-HALF = 0.5  # of what an effect must gain, below which a part neither fits it nor pairs it
 
 
 def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
@@ -118,25 +117,24 @@ class RobotSearch(Search):
                 search, begun = self._beside(held, sites)
                 found = search.run(begun)
                 held, considered = held.with_part(sites, found.fit), considered + found.considered
-                changed += [sites] if set(found.fit.effects) != set(begun.effects) else []
+                if set(found.fit.effects) != set(begun.effects):
+                    changed.append(sites)
+                    held = Held.of(self._together(held))
             if not changed:
                 break
-            kept = self.pruned(self._together(held))
+            kept = self.pruned(self.store.fitted(held.effects, whole))
             whole, considered = kept.fit, considered + kept.considered
             waiting = self._again(whole, changed)
         return Chosen(whole, considered)
 
     def _again(self, whole: Fit, changed: list[frozenset[str]]) -> tuple[frozenset[str], ...]:
         """Parts that are searched again: those with effects beside a part that changed later, and promising ones."""
-        promising = {_site(each.effect) for each in self.store.candidates_for(whole) if each.gain > self._least(whole)}
+        least = self.store.least_expected(self.nominal)
+        promising = {_site(each.effect) for each in self.store.candidates_for(whole) if each.gain > least}
         found = {_site(effect) for effect in whole.effects}
         parts = self._order(whole)
         alone = changed[0] if len(changed) == 1 else None
         return tuple(part for part in parts if promising & part or (found & part and part != alone))
-
-    def _least(self, fit: Fit) -> float:
-        """Expected gain of an effect below which it is, in one of many parts, mostly chance [nats]."""
-        return HALF * (self.rules.least_gain + 0.5 * float(np.log(fit.rows)))
 
     def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
         """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
@@ -200,7 +198,7 @@ class RobotSearch(Search):
         setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
         fitter = self.store.fitter.beside(setting)
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
-        store = FitStore.of(fitter, setting, nominal, self._least(nominal))
+        store = FitStore.of(fitter, setting, nominal)
         if not own:
             return PartSearch.of(store, nominal, self.held_out), nominal
         fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
