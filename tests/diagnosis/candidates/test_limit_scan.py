@@ -18,7 +18,7 @@ GAIN = 12.5  # N per unit of a command without unit
 def test_a_saturation_is_found_where_it_is(share: float, gain: float, fresh_seed: int):
     truth = share * np.abs(bench("linear_axis", {}, fresh_seed).recordings[0]["u"]).max()
     case = bench("linear_axis", {"actuator/saturation": {"F_max": float(truth)}}, fresh_seed)
-    found = guesses(saturations, in_units(case, gain))[:, 0]
+    found = guesses(saturations, "actuator/saturation", in_units(case, gain))[:, 0]
     assert np.abs(np.log(found / truth)).min() < 0.15
 
 
@@ -29,14 +29,14 @@ def test_a_torque_speed_line_is_found_where_it_is(fresh_seed: int):
         "v_free": 1.2 * float(np.abs(np.gradient(usual["x"], usual.t)).max()),
     }
     case = bench("linear_axis", {"actuator/speed_limit": truth}, fresh_seed)
-    found = guesses(speed_limits, case)
+    found = guesses(speed_limits, "actuator/speed_limit", case)
     assert np.abs(np.log(found / list(truth.values()))).max(axis=1).min() < 0.35
 
 
 def test_a_drive_that_gives_all_it_is_asked_for_shows_hardly_a_limit(fresh_seed: int):
     case = bench("linear_axis", {}, fresh_seed)
     largest = max(np.abs(r["u"]).max() for r in case.recordings)
-    assert all(limit > 0.5 * largest for (limit,) in guesses(saturations, case))
+    assert all(limit > 0.5 * largest for (limit,) in guesses(saturations, "actuator/saturation", case))
 
 
 def in_units(case: Bench, gain: float) -> Bench:
@@ -48,7 +48,7 @@ def in_units(case: Bench, gain: float) -> Bench:
     return Bench(nominal, recordings, {})
 
 
-def guesses(scan, case: Bench) -> np.ndarray:
+def guesses(scan, effect: str, case: Bench) -> np.ndarray:
     """What a scan makes of what the nominal model leaves."""
     fit = case.fit()
-    return scan(case.fitter, fit, basis_of(fit))
+    return scan(case.fitter, fit, basis_of(fit), effect)

@@ -14,7 +14,7 @@ def test_ripple_is_found_at_any_number_of_periods(periods: float, fresh_seed: in
     way = np.ptp(np.concatenate([r["theta"] for r in bench("pendulum", {}, fresh_seed).recordings]))
     truth = {"A": 0.02, "n": 2.0 * np.pi * periods / way, "phase": 1.0}
     case = bench("pendulum", {"actuator/ripple": truth}, fresh_seed)
-    amplitude, number, _ = guesses(ripples, case)[0]
+    amplitude, number, _ = guesses(ripples, "actuator/ripple", case)[0]
     assert number * way == pytest.approx(truth["n"] * way, abs=1.5)  # [rad] over the whole way
     assert amplitude == pytest.approx(truth["A"], rel=0.5)
 
@@ -26,14 +26,14 @@ def test_a_sticky_spot_is_found_where_it_is(width: float, fresh_seed: int):
     place = np.quantile(x, [low, low]) + np.array([0.0, width * np.ptp(x)])
     truth = {"F_c": 0.5, "lo": float(place[0]), "hi": float(place[1])}
     case = bench("linear_axis", {"translation/sticky_spot": truth}, fresh_seed)
-    level, lo, hi = guesses(sticky_spots, case)[0]
+    level, lo, hi = guesses(sticky_spots, "translation/sticky_spot", case)[0]
     passed = np.concatenate([r["x"] for r in case.recordings])
     seen = np.clip(place, passed.min(), passed.max())  # friction may keep the axis from going all the way
     assert [lo, hi] == pytest.approx(seen.tolist(), abs=0.05 * np.ptp(passed))
     assert level == pytest.approx(truth["F_c"], rel=0.5)
 
 
-def guesses(scan, case: Bench) -> np.ndarray:
+def guesses(scan, effect: str, case: Bench) -> np.ndarray:
     """What a scan makes of what the nominal model leaves."""
     fit = case.fit()
-    return scan(case.fitter, fit, basis_of(fit))
+    return scan(case.fitter, fit, basis_of(fit), effect)

@@ -19,9 +19,10 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import HALF, FitStore
-from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
+from wipx.diagnosis.selection.search import Chosen, ConsideredEffect, History, Search
 
 SWEEPS = 4  # searches of a part, at most
+TRIED = 3  # weakest effects of all, without which the robot is fitted
 
 
 def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
@@ -33,7 +34,7 @@ def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
 
 
 def expected_loss(fit: Fit, effect: str) -> float:
-    """What a fit would lose without an effect, were its likelihood a parabola (Wald 1943) [nats]."""
+    """What a fit loses without an effect at the same noise, were its likelihood a parabola (Wald 1943) [nats]."""
     indices = fit.hypothesis.parameters_of(effect)
     space = fit.hypothesis.space
     shift = (fit.hypothesis.cube - space.neutral)[indices]
@@ -149,12 +150,12 @@ class RobotSearch(Search):
         return self.run(fit)
 
     def pruned(self, fit: Fit) -> Chosen:
-        """Without the effects that those of other parts make superfluous, the weakest first."""
-        losses = {effect: expected_loss(fit, effect) for effect in fit.effects}
-        for effect in sorted(losses, key=lambda each: losses[each]) if len(losses) > 1 else ():
-            rest = Hypothesis.of(self.store.setting, tuple(e for e in fit.effects if e != effect), {})
-            if losses[effect] > DOUBTED * self.criteria.required_gain(replace(fit, hypothesis=rest), fit):
-                continue
+        """Without the effects that those of other parts make superfluous.
+
+        The weakest are tried first, as long as one of the last few was superfluous.
+        """
+        weakest = sorted(fit.effects, key=lambda effect: expected_loss(fit, effect)) if len(fit.effects) > 1 else ()
+        for effect in weakest[:TRIED]:
             smaller = self.store.without(fit, effect)
             if not self.criteria.gains_enough(smaller, fit):
                 considered = ConsideredEffect(effect, evidence(smaller, fit), False, "superfluous beside other joints'")

@@ -1,0 +1,33 @@
+"""A robot is searched part by part: what its parts are, and what an effect is worth beside those of other parts."""
+
+from pathlib import Path
+
+import numpy as np
+from diagnosis.recorded import bench
+from sim.random_trees import mjcf
+
+from wipx.core.plant import robot_plant
+from wipx.diagnosis.selection.criteria import evidence
+from wipx.diagnosis.selection.robot_search import expected_loss, parts_of
+from wipx.recordings.robot_model import read_tree
+
+
+def test_every_site_belongs_to_one_part_and_links_stand_together(fresh_seed: int, tmp_path: Path):
+    file = tmp_path / "robot.xml"
+    file.write_text(mjcf(4, np.random.default_rng(fresh_seed)), encoding="utf-8")
+    plant = robot_plant(read_tree(file, {}), {})
+    parts = parts_of(plant)
+    assert sorted(site for part in parts for site in part) == sorted(plant.sites)
+    assert len(parts) == 1 + len(plant.joints)
+    links = {site for site in plant.sites if site.startswith("link_")}
+    assert links < parts[0]
+    for joint, part in zip(plant.joints, parts[1:], strict=True):
+        assert {plant.joint_at(site) for site in part} == {joint}
+
+
+def test_noise_that_is_fitted_anew_takes_over_part_of_the_expected_loss(fresh_seed: int):
+    case = bench("linear_axis", {"translation/viscous": {"sigma": 0.02}}, fresh_seed)
+    with_it, without = case.fit("translation/viscous"), case.fit()
+    loss = evidence(without, with_it)
+    assert loss > 5.0
+    assert loss < 1.1 * expected_loss(with_it, "translation/viscous")
