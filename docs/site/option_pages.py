@@ -111,7 +111,7 @@ def _settings(
 
 def _kind(annotation: object) -> str:
     """An annotation as its module writes it."""
-    text = annotation.__name__ if type(annotation) is type else str(annotation)
+    text = annotation.__name__ if isinstance(annotation, type) else str(annotation)
     return re.sub(r"\b(typing|collections\.abc)\.", "", text)
 
 
