@@ -17,6 +17,7 @@ from wipx.recordings.matching.units import FORCES, NEAR, SLIDING_FORCES, Measure
 from wipx.recordings.signals import Signal
 
 KNOWN = 0.4  # relative standard error up to which a gain says something
+SHOWN = 0.3  # share of a lag left up to which the stiffness of a position drive is believed
 CLOSED = 0.25  # share of the Coulomb friction in the command from which a position control made it
 
 
@@ -126,13 +127,14 @@ def drives_of(
     own = [there[c] if c >= 0 else CommandSource("none", "", ()) for c in chosen.placed.commands]
     units = {slides: _force_unit(tree, own, chosen, slides) for slides in (False, True)}
     motor = _shows_friction(tree, logs, own, positions, chosen)
+    servos = np.array([each.kind == "target" and not link.slides for each, link in zip(own, tree.links, strict=True)])
     found = []
     for j, link in enumerate(tree.links):
         source, given = own[j], in_file.get(link.joint)
         if source.kind == "none":
             found.append(JointDrive(Drive("none"), words="no command in the log, taken as passive"))
         elif source.kind == "target":
-            found.append(_position_drive(link.joint, link.slides, source, given, chosen, j))
+            found.append(_position_drive(link.joint, link.slides, source, given, chosen, j, servos))
         else:
             found.append(_torque_drive(link.joint, source, units[link.slides], chosen, j, motor=motor))
     return [
@@ -204,7 +206,7 @@ def _torque_drive(
 
 
 def _position_drive(
-    joint: str, slides: bool, source: CommandSource, given: Drive | None, chosen: Assignment, j: int
+    joint: str, slides: bool, source: CommandSource, given: Drive | None, chosen: Assignment, j: int, servos: np.ndarray
 ) -> JointDrive:
     assert source.target is not None
     target, placed = source.target, chosen.placed
@@ -215,20 +217,26 @@ def _position_drive(
     if given is not None and given.kind == "position":
         words = f"position drive of the model file, targets {source.column} in {target.words}"
         return JointDrive(None, signals, {}, words)
-    gain, error, viscous = (
-        float(chosen.fit.coefficients[j, 0]),
-        float(chosen.fit.error[j]),
-        chosen.fit.coefficients[j, 2],
-    )
-    known = gain > 0.0 and error < KNOWN * gain
-    share = gain if gain > 0.0 else 0.01
+    gain, viscous = float(chosen.fit.coefficients[j, 0]), float(chosen.fit.coefficients[j, 2])
+    known = bool(_known_stiffness(chosen)[j])
+    typical = chosen.fit.coefficients[_known_stiffness(chosen) & servos, 0]
+    share = gain if known or not len(typical) else float(np.median(typical))
+    share = share if share > 0.0 else 0.01
     drive = Drive("position", kp=float(f"{1.0 / share:.4g}"), kd=float(f"{viscous / share:.3g}"))
-    uncertainty = {f"{joint}.kp": float(f"{min(max(error / gain, 0.1), 0.5):.2g}") if known else 0.5}
+    spread = min(max(float(chosen.fit.error[j]) / gain, 0.1), 1.0) if known else 1.0
+    uncertainty = {f"{joint}.kp": float(f"{spread:.2g}")}
     if drive.kd > 0.0:
-        uncertainty[f"{joint}.kd"] = 0.5
+        uncertainty[f"{joint}.kd"] = 0.5 if known else 1.0
     per = "N/m" if slides else "N m/rad"
-    words = f"position drive, targets {source.column} in {target.words}, kp {drive.kp:.4g} {per} read off the motion"
+    origin = "read off the motion" if known else "taken from the other drives" if len(typical) else "guessed"
+    words = f"position drive, targets {source.column} in {target.words}, kp {drive.kp:.4g} {per} {origin}"
     return JointDrive(drive, signals, uncertainty, words, "stiffness")
+
+
+def _known_stiffness(chosen: Assignment) -> np.ndarray:
+    """Whether the motion shows the stiffness of each drive: its lag is mostly explained, and not by friction alone."""
+    gain, error = chosen.fit.coefficients[:, 0], chosen.fit.error
+    return (gain > 0.0) & (error < KNOWN * np.where(gain > 0.0, gain, 0.0)) & (chosen.fit.left < SHOWN)
 
 
 def _shows_friction(

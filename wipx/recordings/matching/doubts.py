@@ -88,9 +88,7 @@ def drive_doubts(tree: Tree, drives: Sequence[JointDrive]) -> list[str]:
     }
     if unsure["stiffness"]:
         joints = _and(unsure["stiffness"])
-        found.append(
-            f"kp and kd of the position drives of {joints} are read off the motion; give the maker's if you have them"
-        )
+        found.append(f"kp and kd of the position drives of {joints} are estimates; give the maker's if you have them")
     if unsure["gain"]:
         found.append(
             f"the motion does not show the drive's gain of {_and(unsure['gain'])}; that of the other drives is taken"

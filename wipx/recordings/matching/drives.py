@@ -10,6 +10,7 @@ SIDE = 0.06  # [s] on each side of a reversal over which commands are averaged, 
 FEWEST_REVERSALS = 4
 FOLLOWS = 0.9  # share of a position's variance that a target explains
 FOLLOWS_CLOSELY = 0.97  # likewise, where no name says that it is a target
+FOLLOWS_LIKE_OTHERS = 0.7  # likewise, where most other columns of that role are targets
 RATIOS = (
     1.0,
     180.0 / np.pi,
@@ -64,14 +65,19 @@ def target_unit(target: np.ndarray, position: np.ndarray, own: Measure, *, slide
     return TargetUnit(slope, start, f"a unit of {abs(slope):.4g} rad or m", "")
 
 
-def follows(target: np.ndarray, position: np.ndarray) -> bool:
+def follows(target: np.ndarray, position: np.ndarray, share: float = FOLLOWS_CLOSELY) -> bool:
     """Whether a position follows a column as a target, both as logged, in one unit or in two usual ones.
 
     A torque against gravity resembles the position too, but hardly in the ratio of two units.
+
+    Args:
+        target: The column, shape (rows,).
+        position: Likewise.
+        share: Least share of the position's variance that the target explains.
     """
     slope, start = line(target, position)
     spread = float(np.var(position))
-    if spread == 0.0 or np.var(position - slope * target - start) > (1.0 - FOLLOWS_CLOSELY) * spread:
+    if spread == 0.0 or np.var(position - slope * target - start) > (1.0 - share) * spread:
         return False
     return any(1.0 / SAME < abs(slope) / ratio < SAME for ratio in RATIOS)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.errors import InputError
-from wipx.recordings.matching.drives import follows
+from wipx.recordings.matching.drives import FOLLOWS_CLOSELY, FOLLOWS_LIKE_OTHERS, follows
 from wipx.recordings.matching.log import Log, same_columns
 from wipx.recordings.matching.names import ALIKE, ColumnName, columns_by_name, likeness, read_name
 
@@ -63,13 +63,20 @@ def joint_columns(logs: Sequence[Log], joints: Sequence[str]) -> tuple[JointColu
         left = [n for n in moving if n.role == "unknown" and n not in positions]
         forces = _of_joints(left, keys)
     rates = _of_joints([n for n in names if n.role == "rate"], keys)
+    pairs = [(logs, command, name.name) for command, name in zip(commands, own, strict=True) if command]
+    mostly = 2 * sum(_is_target(*pair, FOLLOWS_CLOSELY) for pair in pairs) >= max(len(pairs), 1)
+    share = FOLLOWS_LIKE_OTHERS if mostly else FOLLOWS_CLOSELY
     found = []
     for j, name in enumerate(own):
         target, command = targets[j], commands[j]
-        if command and not target and all(follows(log.columns[command], log.columns[name.name]) for log in logs):
+        if command and not target and _is_target(logs, command, name.name, share):
             target, command = command, ""
         found.append(JointColumns(name.name, chosen.certain[j], target, command, forces[j], rates[j]))
     return tuple(found)
+
+
+def _is_target(logs: Sequence[Log], command: str, position: str, share: float) -> bool:
+    return all(follows(log.columns[command], log.columns[position], share) for log in logs)
 
 
 def _of_joints(names: list[ColumnName], keys: list[tuple[str, ColumnName]]) -> list[str]:
