@@ -1,5 +1,6 @@
 """The command line as a user meets it: exit status, one line on an error, nothing left behind."""
 
+import errno
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wipx.app import configuration_folder
+from wipx.app import configuration_folder, explanation
 from wipx.renamed import renamed
 
 STUB_APP = Path(__file__).with_name("stub_app.py")
@@ -145,6 +146,11 @@ def test_an_output_folder_that_cannot_be_made_is_the_users_to_mend(command_line:
     assert answer.status == 2
     assert answer.error.startswith("output folder file/out: Not a directory; choose another with hydra.run.dir=FOLDER")
     assert answer.error.count("\n") == 1
+
+
+def test_a_full_disk_is_the_users_to_mend():
+    error = OSError(errno.ENOSPC, "No space left on device", "runs/a")
+    assert explanation(error) == "runs/a: No space left on device; make room, and the same command does the rest"
 
 
 def test_an_output_folder_that_was_there_before_survives_a_failure(command_line: CommandLine):

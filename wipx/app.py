@@ -39,8 +39,8 @@ FLAGS = ("-m", "--multirun", "--config-dir=")
 DONE, DEFECT, INPUT_AT_FAULT, INTERRUPTED = 0, 1, 2, 130
 AGAIN = "and the same command does the rest"
 REFUSED_BY_DISK = {
-    errno.ENOSPC: f"make room; {AGAIN}",
-    errno.EDQUOT: f"make room; {AGAIN}",
+    errno.ENOSPC: f"make room, {AGAIN}",
+    errno.EDQUOT: f"make room, {AGAIN}",
     errno.EROFS: "choose a folder that can be written to",
     errno.EACCES: "choose a folder that can be written to",
 }
@@ -165,6 +165,8 @@ def _run_reported(config: DictConfig, out: Path) -> None:
         else:
             _run_job(config, out)
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in REFUSED_BY_DISK and error.filename is None:
+            error.filename = str(out)  # a failed write does not know its file
         if HydraConfig.get().mode is RunMode.RUN:
             raise RunFailed(error) from error
         line = explanation(error)
