@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
+.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control tables dashboard test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -73,6 +73,12 @@ fig-friction: $(READY)  ## the paper's Fig. 3: its joint model beside Coulomb an
 
 fig-margins: $(READY)  ## stability margins of all controllers, and the loads from which they recover
 	$(PY) -m wipx +experiment=margins
+
+tables: $(READY)  ## every table and figure, and one page beside the paper's figures (PROFILE=full, LAUNCHER=submitit_slurm, ONLY=methods,control)
+	$(PY) -m wipx task=tables$(SUFFIX) $(if $(LAUNCHER),task.launcher=$(LAUNCHER)) $(if $(ONLY),'task.only=[$(ONLY)]') tracking=none hydra.run.dir=runs/tables
+
+dashboard: $(READY)  ## MLflow in a browser: runs, comparisons, files (PORT=5001 for another port)
+	$(PY) -m wipx task=dashboard $(if $(PORT),task.port=$(PORT))
 
 # A process of the tests has one core; threads of linear algebra on small matrices would only wait for each other.
 ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1

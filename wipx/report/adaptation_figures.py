@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wipx.core.adaptation import AdaptationResult
 from wipx.report.files import write_whole
 from wipx.report.numbers import scale_for, significant
-from wipx.report.panels import MUTED, RECORDED, png, quiet
+from wipx.report.panels import MUTED, RECORDED, picture, quiet
 
 # Okabe and Ito 2008, a palette that colour-blind people can tell apart
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#5b6470", "#a05d00")
@@ -52,7 +52,7 @@ def draw_convergence(runs: Sequence[AdaptationResult], path: Path) -> None:
         axes.set_xlabel(title, color=MUTED)
     left.set_ylabel("best loss over the best of all", color=MUTED)
     figure.legend(loc="outside right center", frameon=False)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def draw_trajectories(runs: Sequence[AdaptationResult], path: Path, *, classes: int = 4) -> None:
@@ -77,7 +77,7 @@ def draw_trajectories(runs: Sequence[AdaptationResult], path: Path, *, classes: 
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
     for axes in grid[-1]:
         axes.set_xlabel("time since the release [s]", color=MUTED)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def _draw_class(axes, runs: Sequence[AdaptationResult], name: str, joint: int, column: str) -> None:

@@ -11,7 +11,7 @@ from wipx.core.control_result import ControlResult, ControlTrial
 from wipx.report.adaptation_figures import COLOURS as OTHERS
 from wipx.report.files import write_whole
 from wipx.report.numbers import significant
-from wipx.report.panels import COMPLETED, MUTED, NOMINAL, png, quiet
+from wipx.report.panels import COMPLETED, MUTED, NOMINAL, picture, quiet
 
 COLOURS = (NOMINAL, COMPLETED, *OTHERS[2:])  # the baseline comes first, ours second
 BROAD, FINE = 3.6, 1.4  # lines
@@ -48,7 +48,7 @@ def draw_errors(results: Sequence[ControlResult], path: Path) -> None:
     grid[1, 0].set_ylabel("|pitch - balance| [rad]", color=MUTED)
     handles, names = grid[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper center", ncols=len(names), frameon=False)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def _labels(results: Sequence[ControlResult]) -> list[str]:

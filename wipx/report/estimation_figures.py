@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wipx.core.estimation import EstimationResult, Judged
 from wipx.report.adaptation_figures import COLOURS
 from wipx.report.files import write_whole
-from wipx.report.panels import COMPLETED, MUTED, png, quiet
+from wipx.report.panels import COMPLETED, MUTED, picture, quiet
 
 LARGEST = 5  # results beside each other
 
@@ -31,7 +31,7 @@ def draw_estimates(results: Sequence[EstimationResult], path: Path) -> None:
         grid[1, i].set_xlabel("pitch at which the robot balances [rad]", color=MUTED)
     for axes in grid[:, 0]:
         axes.set_ylabel("estimate [rad]", color=MUTED)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def draw_lengths(results: Sequence[EstimationResult], path: Path) -> None:
@@ -62,7 +62,7 @@ def draw_lengths(results: Sequence[EstimationResult], path: Path) -> None:
     latency.set_xscale("log")
     lengths.set_ylabel("RMSE of the equilibrium pitch [mrad]", color=MUTED)
     lengths.legend(frameon=False, fontsize=8)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def _draw_judged(axes, judged: Judged, title: str, reach: float) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wipx.report.files import write_whole
-from wipx.report.panels import COMPLETED, MUTED, NOMINAL, png, quiet
+from wipx.report.panels import COMPLETED, MUTED, NOMINAL, picture, quiet
 
 
 @dataclass(frozen=True)
@@ -55,4 +55,4 @@ def draw_friction(sweep: FrictionSweep, title: str, path: Path) -> None:
     course.set_xlabel("time about a reversal [ms]", color=MUTED)
     whole.legend(frameon=False, loc="lower right", fontsize=8)
     figure.suptitle(title, x=0.01, ha="left", fontsize=10)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))

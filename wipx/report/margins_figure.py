@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter
 from wipx.core.margins import Margins, Recovery, RecoveryRegion
 from wipx.report.files import write_whole
 from wipx.report.numbers import compact, significant
-from wipx.report.panels import COMPLETED, GRID, MUTED, NOMINAL, png, quiet
+from wipx.report.panels import COMPLETED, GRID, MUTED, NOMINAL, picture, quiet
 
 LONGEST_BAR = 100.0  # gain factors beyond it are drawn to here
 COLUMNS = 4  # at most
@@ -51,7 +51,7 @@ def draw_margins(margins: Mapping[str, Margins], path: Path) -> None:
         axes.set_title(title, loc="left", fontsize=10, color=MUTED)
     gain.set_yticks(rows, names)
     figure.suptitle("Margins at the command; filter, limits and dry friction left out", x=0.01, ha="left", fontsize=10)
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def draw_recovery(region: RecoveryRegion, path: Path) -> None:
@@ -84,7 +84,7 @@ def draw_recovery(region: RecoveryRegion, path: Path) -> None:
         ha="left",
         fontsize=10,
     )
-    write_whole(path, png(figure))
+    write_whole(path, picture(figure, path))
 
 
 def _draw_region(axes: Axes, region: RecoveryRegion, recovery: Recovery):

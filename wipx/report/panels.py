@@ -1,6 +1,7 @@
 """The panels of which pictures consist: signals, errors, and their common style."""
 
 import io
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -108,6 +109,15 @@ def with_unit(name: str, unit: str) -> str:
 
 def png(figure: Figure) -> bytes:
     """The figure as the content of a PNG file."""
+    return _content(figure, "png")
+
+
+def picture(figure: Figure, path: Path) -> bytes:
+    """The figure as the content of a file of the path's kind: .png or .pdf."""
+    return _content(figure, path.suffix.removeprefix("."))
+
+
+def _content(figure: Figure, kind: str) -> bytes:
     image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=DPI, facecolor="white")
+    figure.savefig(image, format=kind, dpi=DPI, facecolor="white")
     return image.getvalue()

@@ -20,7 +20,7 @@ from wipx.report.numbers import significant
 from wipx.tasks.control import Control
 from wipx.tasks.dataset import Dataset, training_set_of
 from wipx.tasks.files.finished import finish, finished
-from wipx.tasks.files.results import written_together
+from wipx.tasks.files.results import FIGURES, written_together
 from wipx.tasks.files.tracked import log_run, note_run, training_data
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
@@ -109,8 +109,9 @@ def _write(job: Job, folder: Path, found: Mapping[str, Margins], region: Recover
     from wipx.report.margins_figure import draw_margins, draw_recovery
     from wipx.report.margins_table import margins_table
 
-    draw_margins(found, folder / "margins.png")
-    draw_recovery(region, folder / "recovery.png")
+    for suffix in FIGURES:
+        draw_margins(found, folder / f"margins{suffix}")
+        draw_recovery(region, folder / f"recovery{suffix}")
     (folder / "table.md").write_text(margins_table(found, region), encoding="utf-8")
     regions = {
         name: {key: values.tolist() for key, values in asdict(recovery).items()} | {"share": recovery.share}

@@ -163,7 +163,7 @@ class MlflowTracking:
     def _opened(self) -> Iterator["MlflowClient"]:
         """A client of the store; what goes wrong with it is an `InputError`."""
         check_reachable(self.store)
-        client_type = _quiet_client_type()
+        client_type = quiet_client_type()
         from mlflow.exceptions import MlflowException
         from sqlalchemy.exc import SQLAlchemyError
 
@@ -212,7 +212,7 @@ def _client(client_type: type["MlflowClient"], store: str, folder: Path) -> "Mlf
 
 
 @cache
-def _quiet_client_type() -> type["MlflowClient"]:
+def quiet_client_type() -> type["MlflowClient"]:
     """MLflow's client, with its chatter, telemetry and look at git switched off, and little patience with servers."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")

@@ -13,6 +13,7 @@ from wipx.core.errors import InputError
 
 RESULT = "result.json"  # what a job found, with its settings
 UNFINISHED = ".unfinished-"
+FIGURES = (".png", ".pdf")  # kinds of files in which tables of sweeps leave their figures
 BEGIN, END = "<!-- table: begin -->\n", "<!-- table: end -->"
 
 

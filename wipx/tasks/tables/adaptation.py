@@ -9,7 +9,7 @@ from wipx.core.errors import InputError
 from wipx.recordings.model_file import read_model
 from wipx.tasks.files.adaptation import read_adaptation
 from wipx.tasks.files.finished import finished_jobs
-from wipx.tasks.files.results import replace_table, write_csv, written_together
+from wipx.tasks.files.results import FIGURES, replace_table, write_csv, written_together
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.trials import hidden_file
 
@@ -40,7 +40,8 @@ class OptimizerTable:
         table = optimizer_table(scores)
         with written_together(job.out) as folder:
             (folder / "table.md").write_text(table, encoding="utf-8")
-            draw_convergence(searched, folder / "convergence.png")
+            for suffix in FIGURES:
+                draw_convergence(searched, folder / f"convergence{suffix}")
         _publish(job, sweep, table, self.page, job.out / "convergence.png")
 
 
@@ -69,7 +70,8 @@ class MethodTable:
         ]
         with written_together(job.out) as folder:
             (folder / "table.md").write_text(table, encoding="utf-8")
-            draw_trajectories(typical, folder / "trajectories.png")
+            for suffix in FIGURES:
+                draw_trajectories(typical, folder / f"trajectories{suffix}")
             write_csv(folder / "trajectories.csv", _columns(typical))
         _publish(job, sweep, table, self.page, job.out / "trajectories.png")
 

@@ -8,7 +8,7 @@ from wipx.core.control_result import ControlResult
 from wipx.core.errors import InputError
 from wipx.tasks.files.control import read_control
 from wipx.tasks.files.finished import finished_jobs
-from wipx.tasks.files.results import replace_table, written_together
+from wipx.tasks.files.results import FIGURES, replace_table, written_together
 from wipx.tasks.shared.job import Job
 
 
@@ -48,7 +48,8 @@ class ControlTable:
         with written_together(job.out) as folder:
             table = self._write_tables(folder, scenarios, studied)
             for name, results in scenarios.items():
-                draw_errors(results, folder / f"{name}.png")
+                for suffix in FIGURES:
+                    draw_errors(results, folder / f"{name}{suffix}")
             animate(pair, self.film_load, folder / "control.gif")
         self._publish(job, table)
 

@@ -8,7 +8,7 @@ from wipx.core.errors import InputError
 from wipx.core.estimation import EstimationResult
 from wipx.tasks.files.estimation import read_estimation
 from wipx.tasks.files.finished import finished_jobs
-from wipx.tasks.files.results import replace_table, written_together
+from wipx.tasks.files.results import FIGURES, replace_table, written_together
 from wipx.tasks.shared.job import Job
 
 
@@ -35,7 +35,8 @@ class MethodsTable:
         ]
         table, latex = methods_table(results)
         with written_together(job.out) as folder:
-            draw_estimates(typical, folder / "estimates.png")
+            for suffix in FIGURES:
+                draw_estimates(typical, folder / f"estimates{suffix}")
             _write(folder, table, latex)
         _publish(job, Path(self.folder), table, self.page)
 
@@ -62,8 +63,10 @@ class EstimatorsTable:
         best = sorted((r for r in results if r.length == longest), key=lambda r: r.recorded.rmse)
         table, latex = estimators_table(results)
         with written_together(job.out) as folder:
-            draw_lengths(results, folder / "lengths.png")
-            draw_estimates(list({r.estimator: r for r in reversed(best)}.values())[::-1], folder / "estimates.png")
+            shown = list({r.estimator: r for r in reversed(best)}.values())[::-1]
+            for suffix in FIGURES:
+                draw_lengths(results, folder / f"lengths{suffix}")
+                draw_estimates(shown, folder / f"estimates{suffix}")
             _write(folder, table, latex)
         _publish(job, Path(self.folder), table, self.page)
 

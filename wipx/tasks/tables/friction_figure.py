@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.core.errors import InputError, check_positive, unknown_name
-from wipx.tasks.files.results import write_csv, written_together
+from wipx.tasks.files.results import FIGURES, write_csv, written_together
 from wipx.tasks.shared.job import Job
 
 SYMBOLS = ("F_s", "F_c", "v_s", "sigma", "epsilon", "alpha")
@@ -58,5 +58,6 @@ class FrictionFigure:
         with written_together(job.out) as folder:
             columns = {"t": sweep.t, "velocity": sweep.velocity, "eq5": sweep.friction, "baseline": sweep.baseline}
             write_csv(folder / "friction.csv", columns)
-            draw_friction(sweep, f"Joint model of the paper's Eq. 5: {numbers}", folder / "friction.png")
+            for suffix in FIGURES:
+                draw_friction(sweep, f"Joint model of the paper's Eq. 5: {numbers}", folder / f"friction{suffix}")
         print(f"picture: {job.out / 'friction.png'}")
