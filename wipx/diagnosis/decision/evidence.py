@@ -50,6 +50,8 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
     context = context.trusting(chosen.fit)
     doubted = context.setting.doubted(context.rules.forecasts.undeclared)
     fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, doubted)
+    if context.data.plant.tree is not None and fitter.is_possible and not context.is_quiet(chosen.fit):
+        return _by_forecasts(context, fitter, chosen.fit)[0]  # laws of an arm hold nearly at best: that decides alone
     rest, shapes = decided(context, search, chosen)
     by_row = Found(context, search, rest, shapes)
     if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
@@ -90,6 +92,10 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     search = search_of(FitStore.of(fitter, setting, nominal), nominal)
     criteria = search.criteria
     best = search.run()
+    if setting.nominal.plant.tree is not None:
+        ahead = ahead.trusting(best.fit)
+        same_names = set(best.fit.effects) == set(chosen.effects)
+        return Found(ahead, search, *_left_over(ahead, search.nominal, best)), same_names
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
     same = nominal
     if chosen.effects:

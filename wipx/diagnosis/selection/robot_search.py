@@ -125,6 +125,8 @@ class RobotSearch(Search):
                 break
             kept = self.pruned(self.store.fitted(held.effects, whole))
             whole, considered = kept.fit, considered + kept.considered
+            if self._asks_for_more(whole):
+                break
             waiting = self._again(whole, changed)
         return Chosen(whole, considered)
 
@@ -144,6 +146,17 @@ class RobotSearch(Search):
         by_row = self.store.fitter.sketched_by_row(fit)[1].levels
         usual = np.array([scales[site].force for site in self.plant.joints])
         return (rest, *(joints[j] for j in np.argsort(-by_row.force / usual)))
+
+    def _asks_for_more(self, whole: Fit) -> bool:
+        """Whether innovations need forces beside those of all laws: forecasts will decide, and more sweeps are lost."""
+        fitter, seen = self.store.fitter.sketched_by_row(whole)
+        usual = np.array([self.store.setting.scales[site].force for site in self.plant.joints])
+        return fitter is self.store.fitter and bool(np.any(seen.levels.force > self.quiet * usual))
+
+    @property
+    def quiet(self) -> float:
+        """Force that innovations may ask for where laws hold, beside the usual one [s^0.5]."""
+        return self.store.fitter.rules.trust.quiet
 
     def exchanged(self, fit: Fit) -> Chosen:
         """Every part searched again, from the effects of a fit on."""
