@@ -142,6 +142,13 @@ class SelectionRules:
     worth_pairing: float = rule(
         4.0, "nats", "gain of an effect, not enough alone, for which a second one is sought", DEVELOPING, UNLIMITED
     )
+    expected_share: float = rule(
+        0.5,
+        "of what an effect must gain",
+        "expected gain from which an effect of one of many joints is fitted, and gain from which it is paired",
+        "derived: of two effects that share what they must gain, one gains half of it",
+        0.0,
+    )
 
 
 @dataclass(frozen=True)

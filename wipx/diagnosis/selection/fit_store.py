@@ -19,7 +19,6 @@ LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 FITTED_TO_THE_END = 3  # effects for which they are, at most
-HALF = 0.5  # of what an effect must gain
 
 
 @dataclass(frozen=True)
@@ -50,10 +49,11 @@ class FitStore:
         return self.setting.sites is not None
 
     def least_expected(self, fit: Fit) -> float:
-        """Expected gain below which an effect of one of many parts is not worth a fit: half of what it must gain."""
+        """Expected gain below which an effect of one of many parts is not worth a fit [nats]."""
         explained = max(evidence(self.nominal, fit), 0.0)
         required = self.fitter.required_beyond_penalty(fit, fit, explained)
-        return HALF * (max(self.fitter.rules.selection.least_gain, required) + 0.5 * float(np.log(fit.rows)))
+        rules = self.fitter.rules.selection
+        return rules.expected_share * (max(rules.least_gain, required) + 0.5 * float(np.log(fit.rows)))
 
     def keep(self, fit: Fit) -> Fit:
         """Keep a fit as the best of its effects, and return it."""

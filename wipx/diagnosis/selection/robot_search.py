@@ -18,7 +18,7 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
-from wipx.diagnosis.selection.fit_store import HALF, FitStore
+from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Chosen, ConsideredEffect, History, Search
 
 SWEEPS = 4  # searches of a part, at most
@@ -86,8 +86,8 @@ class PartSearch(Search):
     """The search for the missing effects of one part."""
 
     def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
-        """Whether it gains half of what it must: two that do not feign each other share what they gain."""
-        return evidence(current, one) >= HALF * self.criteria.required_gain(current, one)
+        """Whether it gains a good part of what it must: less, in one of many parts, is mostly chance."""
+        return evidence(current, one) >= self.rules.expected_share * self.criteria.required_gain(current, one)
 
 
 @dataclass(frozen=True)
