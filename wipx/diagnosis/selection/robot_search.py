@@ -121,13 +121,14 @@ class RobotSearch(Search):
                 if set(found.fit.effects) != set(begun.effects):
                     changed.append(sites)
                     held = Held.of(self._together(held))
+                if self._is_left_loud(found.fit, sites):
+                    waiting = ()
+                    break
             if not changed:
                 break
             kept = self.pruned(self.store.fitted(held.effects, whole))
             whole, considered = kept.fit, considered + kept.considered
-            if self._asks_for_more(whole):
-                break
-            waiting = self._again(whole, changed)
+            waiting = self._again(whole, changed) if waiting else ()
         return Chosen(whole, considered)
 
     def _again(self, whole: Fit, changed: list[frozenset[str]]) -> tuple[frozenset[str], ...]:
@@ -147,16 +148,16 @@ class RobotSearch(Search):
         usual = np.array([scales[site].force for site in self.plant.joints])
         return (rest, *(joints[j] for j in np.argsort(-by_row.force / usual)))
 
-    def _asks_for_more(self, whole: Fit) -> bool:
-        """Whether innovations need forces beside those of all laws: forecasts will decide, and more sweeps are lost."""
-        fitter, seen = self.store.fitter.sketched_by_row(whole)
-        usual = np.array([self.store.setting.scales[site].force for site in self.plant.joints])
-        return fitter is self.store.fitter and bool(np.any(seen.levels.force > self.quiet * usual))
+    def _is_left_loud(self, fit: Fit, sites: frozenset[str]) -> bool:
+        """Whether innovations ask a joint for forces beside those of its laws, once these have been searched.
 
-    @property
-    def quiet(self) -> float:
-        """Force that innovations may ask for where laws hold, beside the usual one [s^0.5]."""
-        return self.store.fitter.rules.trust.quiet
+        Its laws hold only nearly then. Forecasts will decide, and further searches by innovations are lost.
+        """
+        joints = [j for j, joint in enumerate(self.plant.joints) if joint in sites]
+        if not joints or self.store.fitter.sketched_by_row(fit)[0] is not self.store.fitter:
+            return False
+        usual = self.store.setting.scales[self.plant.joints[joints[0]]].force
+        return bool(fit.levels.force[joints[0]] > self.store.fitter.rules.trust.quiet * usual)
 
     def exchanged(self, fit: Fit) -> Chosen:
         """Every part searched again, from the effects of a fit on."""
