@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 from wipx.core.errors import InputError
+from wipx.core.limits import JointLimits
 from wipx.core.load import Load
 from wipx.recordings.robot_file import ControllerDescription, KnownLoad, read_robot, robot_from_mapping
 
+ARM = Path(__file__).parents[2] / "wipx" / "robots" / "six_axis_arm"
 WIP = """
 plant: wip
 parameters: {body_mass: 2.6, wheel_mass: 1.2, com_height: 0.35, body_inertia: 0.11,
@@ -163,3 +165,33 @@ def test_description_at_fault_is_named_in_one_line(tmp_path: Path, text: str, sa
 def test_missing_file_is_named(tmp_path: Path):
     with pytest.raises(InputError, match="cannot be read"):
         read_robot(tmp_path / "robot.yaml")
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ({"knee": {"speed": 2.0}}, "knee"),
+        ({"elbow": {"speed": 0.0}}, "elbow: speed is 0.0, expected a number above 0"),
+        (
+            {"elbow": {"position": [1.0, -1.0]}},
+            r"elbow: position is \[1.0, -1.0\], expected the lowest and the highest",
+        ),
+        ({"elbow": {"torque": 2.0}}, "torque"),
+        ({"elbow": 3.0}, "elbow is 3.0, expected e.g."),
+    ],
+)
+def test_limits_at_fault_are_named(limits: dict[str, object], message: str):
+    with pytest.raises(InputError, match=message):
+        robot_from_mapping({"plant": "robot", "model": "arm.xml", "limits": limits}, "here", ARM)
+
+
+def test_limits_of_a_joint_are_the_users():
+    limits = {"elbow": {"position": [-1, 1.5], "speed": 2.0, "force": 30.0}, "wrist_1": {"speed": 1.0}}
+    robot = robot_from_mapping({"plant": "robot", "model": "arm.xml", "limits": limits}, "here", ARM)
+    assert robot.limits["elbow"] == JointLimits((-1.0, 1.5), 2.0, 30.0)
+    assert robot.limits["wrist_1"] == JointLimits(speed=1.0)
+
+
+def test_limits_belong_to_robots_from_model_files(tmp_path: Path):
+    with pytest.raises(InputError, match="limits"):
+        read_robot(robot_file(tmp_path, LOADED + "limits: {translation: {speed: 1.0}}\n"))

@@ -32,6 +32,7 @@ class Link:
         friction: Dry friction [N m or N].
         limits: Lowest and highest position; None for no limits [rad or m].
         effort: Largest force of the drive; None for no limit [N m or N].
+        speed: Largest speed; None for no limit [rad/s or m/s].
     """
 
     joint: str
@@ -50,6 +51,7 @@ class Link:
     friction: float = 0.0
     limits: tuple[float, float] | None = None
     effort: float | None = None
+    speed: float | None = None
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from wipx.core.diagnosis import Diagnosis
+from wipx.core.limits import JointLimits
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.answer.answer import answered, proposed
@@ -53,11 +54,13 @@ class KnownRobot:
         nominal: What its owner believes.
         uncertainty: Relative standard deviation of nominal numbers that are not exact.
         feedback: The controller that closed the loop, and its rate [Hz]; None if unknown.
+        limits: Of the joints of a robot from a model file, beside those of the file.
     """
 
     nominal: Model
     uncertainty: Mapping[str, float]
     feedback: tuple[StateFeedback, float] | None = None
+    limits: Mapping[str, JointLimits] = field(default_factory=dict)
 
 
 def diagnose(
@@ -113,7 +116,9 @@ def diagnose(
     watcher("held-out recordings", 0.75)
     answer = answered(context, search, rest, end.shapes)
     watcher("next experiment", 0.9)
-    proposal = proposed(context, search, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0))
+    proposal = proposed(
+        context, search, rest.fit, answer, robot.feedback, rng or np.random.default_rng(0), robot.limits
+    )
     answer = replace(answer, next_experiment=proposal)
     if suspected:
         watcher("suspects", 0.95)

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from wipx.core.errors import InputError, unknown_name
+from wipx.core.limits import JointLimits
 from wipx.core.load import Load
 from wipx.core.model import Model
 from wipx.core.plant import Plant
@@ -65,6 +66,7 @@ class RobotDescription:
         controller: None where the owner gives none.
         signals: Columns of contract section 1 that the log has under another name, unit or sign.
         loads: Known loads by name; a recording that none of them claims is of the robot without load.
+        limits: Of the joints of a robot from a model file, which no experiment may leave.
     """
 
     model: Model
@@ -72,16 +74,18 @@ class RobotDescription:
     controller: ControllerDescription | None
     signals: Mapping[str, Signal]
     loads: Mapping[str, KnownLoad] = field(default_factory=dict)
+    limits: Mapping[str, JointLimits] = field(default_factory=dict)
 
     def __reduce__(self):
         # Mapping proxies do not pickle; rebuild from plain dictionaries.
-        plain = (dict(self.uncertainty), self.controller, dict(self.signals), dict(self.loads))
+        plain = (dict(self.uncertainty), self.controller, dict(self.signals), dict(self.loads), dict(self.limits))
         return RobotDescription, (self.model, *plain)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainty", MappingProxyType(dict(self.uncertainty)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         object.__setattr__(self, "loads", MappingProxyType(dict(self.loads)))
+        object.__setattr__(self, "limits", MappingProxyType(dict(self.limits)))
 
     def load_of(self, recording: str) -> Load | None:
         """The load on the body in the recording of that name; None where there was none.
@@ -125,7 +129,9 @@ def robot_from_mapping(data: Mapping[str, object], where: str, folder: Path | No
     known = {*mapping_of(data, "parameters", where), *uncertainty}
     _check_input_gain(signals, model.plant, given="input_gain" in known, where=where)
     loads = {n: _load(n, c, model, f"{where}: loads") for n, c in mapping_of(data, "loads", where).items()}
-    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals, loads)
+    given = mapping_of(data, "limits", where)
+    limits = {joint: _limits(joint, given[joint], model.plant, f"{where}: limits") for joint in given}
+    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals, loads, limits)
 
 
 def _check_input_gain(signals: Mapping[str, Signal], plant: Plant, *, given: bool, where: str) -> None:
@@ -172,6 +178,30 @@ def _controller(data: Mapping[str, object], plant: Plant, where: str) -> Control
     if rate is None or rate <= 0.0:
         raise InputError(f"{where}: rate is {content['rate']!r}, expected a frequency above 0 Hz")
     return ControllerDescription(kind, _gains(content["gains"], len(plant.commands), where), rate)
+
+
+def _limits(joint: str, data: object, plant: Plant, where: str) -> JointLimits:
+    if plant.tree is None or joint not in plant.joints:
+        raise unknown_name("joint of a model file", joint, plant.joints if plant.tree is not None else (), where)
+    where = f"{where}: {joint}"
+    if not isinstance(data, Mapping):
+        raise InputError(f"{where} is {data!r}, expected e.g. {{position: [-1.5, 1.5], speed: 2.0, force: 3.0}}")
+    check_keys(data, ("position", "speed", "force"), where)
+    position = None
+    if data.get("position") is not None:
+        ends = data["position"]
+        numbers = [finite_number(end) for end in ends] if isinstance(ends, list | tuple) else []
+        if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[0] >= numbers[1]:
+            raise InputError(f"{where}: position is {ends!r}, expected the lowest and the highest [rad or m]")
+        position = (numbers[0], numbers[1])
+    sizes: dict[str, float] = {}
+    for key in ("speed", "force"):
+        if data.get(key) is not None:
+            size = finite_number(data[key])
+            if size is None or size <= 0.0:
+                raise InputError(f"{where}: {key} is {data[key]!r}, expected a number above 0")
+            sizes[key] = size
+    return JointLimits(position, sizes.get("speed"), sizes.get("force"))
 
 
 def _load(name: str, data: object, model: Model, where: str) -> KnownLoad:

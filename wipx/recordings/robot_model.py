@@ -4,6 +4,7 @@ import importlib
 import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -176,6 +177,7 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
     number = {j: i for i, j in enumerate(free)}
     carrier = _carriers(model, number)
     frames = {i: _frame(model, data, j, free) for j, i in number.items()}
+    speeds = _speeds(path)
     links = []
     for j, i in number.items():
         parent = _parent(model, j, number, carrier)
@@ -205,6 +207,7 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
                 friction=float(model.dof_frictionloss[dof]),
                 limits=(float(model.jnt_range[j, 0]), float(model.jnt_range[j, 1])) if limited else None,
                 effort=effort,
+                speed=speeds.get(joints[j]),
             )
         )
     source = ModelFile(path.resolve(), locked)
@@ -212,6 +215,14 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
     _check_masses(tree, path)
     check_names(tree, path)
     return tree
+
+
+def _speeds(path: Path) -> dict[str, float]:
+    """Largest speeds of the joints in a URDF, which MuJoCo does not keep; an MJCF has none."""
+    root = ElementTree.parse(path).getroot()
+    limits = {joint.get("name", ""): joint.find("limit") for joint in root.iter("joint")} if root.tag == "robot" else {}
+    stated = {name: limit.get("velocity") for name, limit in limits.items() if limit is not None}
+    return {name: float(speed) for name, speed in stated.items() if speed is not None and float(speed) > 0.0}
 
 
 def _of_drives(mujoco: Any, model: Any, j: int, values: np.ndarray) -> float:

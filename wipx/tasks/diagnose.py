@@ -48,7 +48,10 @@ class Diagnose:
         description = source.describe()
         recordings = source.load()
         robot = KnownRobot(
-            job.part("plant").nominal(description.model), description.uncertainty, feedback_of(description)
+            job.part("plant").nominal(description.model),
+            description.uncertainty,
+            feedback_of(description),
+            description.limits,
         )
         with StageProgress("diagnose") as progress:
             diagnosis = diagnose(

@@ -1,5 +1,6 @@
 """The answer put together: effects with numbers and rivals, what is unexplained or weak, and what to record next."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from wipx.core.diagnosis import (
     Unexplained,
     Verdict,
 )
+from wipx.core.limits import JointLimits
 from wipx.core.model import Model
 from wipx.core.results import Estimate, FitErrors, Trace
 from wipx.diagnosis.answer.combined_laws import combined
@@ -270,15 +272,16 @@ def proposed(
     answer: Diagnosis,
     feedback: tuple[StateFeedback, float] | None,
     rng: np.random.Generator,
+    limits: Mapping[str, JointLimits] | None = None,
 ) -> NextExperiment | None:
     """The experiment that settles what is tied or weak; None where nothing is."""
-    if context.data.plant.tree is not None:
-        return None
-    tied = [(effect.name, name) for effect in answer.effects for name in effect.equivalent]
+    tied = {effect.name: effect.equivalent for effect in answer.effects}
     rivals = [
-        other
-        for effect, name in tied
-        for other in search.store.replacements(fit, effect)
+        part.store.fitter.seen_by_row(other)[1]
+        for part, own in search.split(fit)
+        for effect in own.effects
+        for name in tied.get(effect, ())
+        for other in part.store.replacements(own, effect)
         if name in other.effects and effect not in other.effects
     ]
     weak = tuple(
@@ -286,12 +289,12 @@ def proposed(
     )
     if not rivals and not weak:
         return None
-    questions = [f"{effect} or {name}" for effect, name in tied] + [f"how large is {name}" for name in weak]
-    seen = tuple(context.fitter.seen_by_row(rival)[1] for rival in rivals)
-    question = Question(f"Open: {', '.join(questions)}.", seen, weak)
+    questions = [f"{effect} or {name}" for effect, names in tied.items() for name in names]
+    questions += [f"how large is {name}" for name in weak]
+    question = Question(f"Open: {', '.join(questions)}.", tuple(rivals), weak)
     closed, rate = feedback if feedback is not None else (None, context.recordings[0].rate)
     simulator = context.by_row.simulator
-    answered_by_row = context.fitter.seen_by_row(fit)[1]
+    by_row = context.fitter.seen_by_row(fit)[1]
     return next_experiment(
-        question, answered_by_row, context.setting, context.data, simulator, closed, rate, rng, context.rules
+        question, by_row, context.setting, context.data, simulator, closed, rate, rng, context.rules, limits
     )

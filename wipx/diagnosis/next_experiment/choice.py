@@ -6,11 +6,13 @@ Fedorov 1975, The design of experiments for discriminating between two rival mod
 number as well as the information of both says. The run is simulated by `simulated_experiment`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wipx.core.diagnosis import Experiment, NextExperiment
+from wipx.core.limits import JointLimits
 from wipx.core.results import NINETY_FIVE
 from wipx.diagnosis.likelihood.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
@@ -18,8 +20,10 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import covariance, inflation
-from wipx.diagnosis.next_experiment.excitations import Reach, excitations_for, how, prescribed
+from wipx.diagnosis.next_experiment.envelope import Envelope
+from wipx.diagnosis.next_experiment.excitations import Reach
 from wipx.diagnosis.next_experiment.simulated_experiment import EVENT, Bench, SimulatedRun, loaded
+from wipx.diagnosis.next_experiment.tree_experiment import TreeBench
 from wipx.diagnosis.rules import USUAL, Rules
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import StateFeedback
@@ -53,6 +57,7 @@ def next_experiment(
     rate: float,
     rng: np.random.Generator,
     rules: Rules = USUAL,
+    limits: Mapping[str, JointLimits] | None = None,
 ) -> NextExperiment | None:
     """The experiment that settles a question best.
 
@@ -66,23 +71,19 @@ def next_experiment(
         rate: Of the controller [Hz].
         rng: Draws phases and noise.
         rules: What decides.
+        limits: Of the joints of a robot from a model file, beside those of the file; None for no more.
 
     Returns:
         The menu by the separation of what stays least clear, after one run of 10 s. None where nothing is open, the
         robot cannot be simulated within its reach, or no experiment would settle anything.
     """
-    reach = Reach.of(data)
-    closed = feedback is not None
-    bench = Bench(simulator, fit.hypothesis, data, reach, fit.levels, feedback, rate)
     asked = _Asked.of(question, fit, data)
     trials, separations = [], []
-    for excitation in excitations_for(fit.hypothesis.model, reach, rng, closed=closed):
-        trial = None if excitation.mass and asked.has_payload_event else bench.tried(excitation, rng)
-        if trial is not None:
-            run = RecordingBatch.of((trial.recording,), data.plant).reporting_nothing(data)
-            fitter = InnovationFitter(InnovationsModel.of(simulator, run, setting.nominal))
-            trials.append(trial)
-            separations.append(asked.separations(fitter, trial.excitation.mass))
+    for trial in _trials(asked, data, simulator, (feedback, rate), limits or {}, rng):
+        run = RecordingBatch.of((trial.recording,), data.plant).reporting_nothing(data)
+        fitter = InnovationFitter(InnovationsModel.of(simulator, run, setting.nominal))
+        trials.append(trial)
+        separations.append(asked.separations(fitter, trial.mass))
     if not trials or not asked.count:
         return None
     table = np.array(separations)
@@ -91,13 +92,13 @@ def next_experiment(
         return None
     worst = table[:, settled].min(axis=1)
     experiments = [
-        _experiment(trial, fit, float(separation), rules, closed=closed, rivals=bool(question.rivals))
+        _experiment(trial, float(separation), rules, rivals=bool(question.rivals))
         for trial, separation in zip(trials, worst, strict=True)
     ]
     order = np.argsort(-worst, kind="stable")
     best = int(order[0])
-    reference = prescribed(data.plant, trials[best].excitation, closed=closed)
-    return NextExperiment(question.sentence, experiments[best], tuple(experiments[i] for i in order), reference)
+    menu = tuple(experiments[i] for i in order)
+    return NextExperiment(question.sentence, experiments[best], menu, trials[best].reference)
 
 
 @dataclass(frozen=True)
@@ -220,14 +221,30 @@ def _steps(cube: np.ndarray, normal: np.ndarray, slope: np.ndarray) -> np.ndarra
     return np.clip(cube - np.array(moves), 0.0, 1.0)
 
 
-def _experiment(
-    trial: SimulatedRun, fit: Fit, separation: float, rules: Rules, *, closed: bool, rivals: bool
-) -> Experiment:
-    sentence = how(trial.excitation, fit.hypothesis.model, trial.command, closed=closed)
+def _trials(
+    asked: _Asked,
+    data: RecordingBatch,
+    simulator: AnalyticSimulator,
+    controller: tuple[StateFeedback | None, float],
+    limits: Mapping[str, JointLimits],
+    rng: np.random.Generator,
+) -> list[SimulatedRun]:
+    """What the robot stands, simulated on the completed model."""
+    fit, (feedback, rate) = asked.fit, controller
+    if data.plant.tree is not None:
+        closed = None if feedback is None else (feedback, rate)
+        envelope = Envelope.of(data, limits)
+        return TreeBench(simulator, fit.hypothesis, data, envelope, fit.levels, closed).trials(rng)
+    bench = Bench(simulator, fit.hypothesis, data, Reach.of(data), fit.levels, feedback, rate)
+    return bench.trials(rng, masses=not asked.has_payload_event)
+
+
+def _experiment(trial: SimulatedRun, separation: float, rules: Rules, *, rivals: bool) -> Experiment:
+    sentence = trial.how
     repeats = int(np.ceil((rules.answer.told_apart / max(separation, 1e-6)) ** 2)) if rivals else 1
     if 1 < repeats <= rules.experiment.most_repeats:
         sentence += f"; do it {repeats} times"
-    return Experiment(trial.excitation.name, sentence, separation)
+    return Experiment(trial.name, sentence, separation)
 
 
 def _value_and_slope(hypothesis: Hypothesis, index: int) -> tuple[float, float]:
