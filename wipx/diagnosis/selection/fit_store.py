@@ -19,6 +19,7 @@ LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 FITTED_TO_THE_END = 3  # effects for which they are, at most
+CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,8 @@ class FitStore:
         if key not in self._fits:
             values = {**reduced_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
-            self._fits[key] = self.fitter.converged(self.fitter.fit(hypothesis, start.levels))
+            found = self.fitter.fit(hypothesis, start.levels)
+            self._fits[key] = self.fitter.converged(found, rounds=2 if self.is_of_part else 4)
         return self._fits[key]
 
     def without(self, fit: Fit, effect: str) -> Fit:
@@ -151,7 +153,8 @@ class FitStore:
         least = max(rules.promising * best, rules.worthless)
         if self.is_of_part:
             least = max(least, self.least_expected(fit))
-        leading = [name for name in by_effect if by_effect[name][0].gain >= least][: self.fitter.considered]
+        most = min(self.fitter.considered, CONSIDERED_IN_PART) if self.is_of_part else self.fitter.considered
+        leading = [name for name in by_effect if by_effect[name][0].gain >= least][:most]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
         fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
         fits.sort(key=lambda f: -score(f, fit))

@@ -85,6 +85,8 @@ def _site(effect: str) -> str:
 class PartSearch(Search):
     """The search for the missing effects of one part."""
 
+    exchanges = 1
+
     def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
         """Whether it gains a good part of what it must: less, in one of many parts, is mostly chance."""
         return evidence(current, one) >= self.rules.expected_share * self.criteria.required_gain(current, one)

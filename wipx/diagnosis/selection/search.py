@@ -6,6 +6,7 @@ and what it considered; fits are kept in a `FitStore`, and `Criteria` decide bet
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from wipx.core.diagnosis import ConsideredEffect
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -17,7 +18,6 @@ from wipx.diagnosis.selection.nested_laws import effects_in_parts, reduced_effec
 
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
-EXCHANGES = 3  # rounds at most
 
 History = tuple[ConsideredEffect, ...]
 
@@ -54,6 +54,7 @@ class Search:
     criteria: Criteria
     first: Fit | None
     held_out: HeldOut | None = None
+    exchanges: ClassVar[int] = 3  # rounds at most
 
     @classmethod
     def of(cls, store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> "Search":
@@ -159,7 +160,7 @@ class Search:
     def exchanged(self, fit: Fit) -> Chosen:
         """Every effect replaced by a better one, or by itself at better values, as long as there is any."""
         considered: History = ()
-        for _ in range(EXCHANGES):
+        for _ in range(self.exchanges):
             best, most = fit, self.rules.least_lead
             for effect in fit.effects:
                 base = self.store.without(fit, effect)
