@@ -26,7 +26,7 @@ COMPILED = ("cached", "law", "inlined", "part")  # decorators
 def sources_digest(package: Path) -> str:
     """Digest of the sources of a package's compiled functions, and of the modules that these take names from."""
     marks = [f"@{name}\n" for name in COMPILED]
-    todo = [path for path in package.rglob("*.py") if path.parent.name != UNSEEN]
+    todo = [path for path in package.rglob("*.py") if UNSEEN not in path.parts]
     todo = [path for path in todo if any(mark in path.read_text(encoding="utf-8") for mark in marks)]
     found: set[Path] = set()
     while todo:
