@@ -68,3 +68,10 @@ def test_an_edit_of_the_package_asks_for_compilation_where_compiled_code_needs_i
 ):
     package = Path(shutil.copytree(PACKAGE, tmp_path / "wipx", ignore=shutil.ignore_patterns("__pycache__", "conf")))
     assert changes(package, source) is compiled
+
+
+def test_what_a_blind_benchmark_hides_is_not_read(tmp_path: Path):
+    hidden = tmp_path / "proof" / "blind_robots" / "trees" / "records.py"
+    hidden.parent.mkdir(parents=True)
+    hidden.write_text("@cached\ndef hidden(x):\n    return x\n", encoding="utf-8")
+    assert not changes(tmp_path, "proof/blind_robots/trees/records.py")
