@@ -13,24 +13,26 @@ from wipx.core.parameters import UNITS, Parameter
 from wipx.effects.catalogue import kinds, of_trees
 
 FOLDER = "reference/effects"
+PICTURE = "![{kind}: its law and a motion with and without it]({kind}.svg)"
 SHOWN = {"kind", "parameters", "law", "source", "sites", "steady"}  # what the page shows in a place of its own
 
 
 def effect_pages() -> dict[str, str]:
     """Markdown by path, the index among them."""
-    pages = {f"{FOLDER}/{kind}.md": _page(effect) for kind, effect in kinds().items()}
+    pages = {f"{FOLDER}/{kind}.md": _page(effect, "wipx.effects", PICTURE) for kind, effect in kinds().items()}
+    pages |= {f"{FOLDER}/trees/{kind}.md": _page(effect, "wipx.effects.trees") for kind, effect in of_trees().items()}
     pages[f"{FOLDER}/index.md"] = _index()
     return pages
 
 
-def _page(effect: Effect) -> str:
+def _page(effect: Effect, package: str, picture: str = "") -> str:
     parts = [
         f"# {effect.kind}",
-        getdoc(import_module(f"wipx.effects.{effect.kind}")) or "",
+        getdoc(import_module(f"{package}.{effect.kind}")) or "",
         "## Law",
         f"```text\n{effect.law}\n```",
         f"Source: {effect.source}.",
-        f"![{effect.kind}: its law and a motion with and without it]({effect.kind}.svg)",
+        *([picture.format(kind=effect.kind)] if picture else []),
         "## Parameters",
         table(("symbol", "meaning", "unit", "absent at", "searched from", "to"), map(_parameter, effect.parameters)),
         "The ends of the search interval are multiples of the joint's characteristic sizes in the recordings "
@@ -74,13 +76,16 @@ def _index() -> str:
         (f"[{kind}]({kind}.md)", f"`{effect.law}`", ", ".join(effect.sites), _answer(not effect.outside_vocabulary))
         for kind, effect in kinds().items()
     ]
-    trees = [(f"`{kind}`", f"`{effect.law}`", ", ".join(effect.sites)) for kind, effect in of_trees().items()]
+    trees = [
+        (f"[{kind}](trees/{kind}.md)", f"`{effect.law}`", ", ".join(effect.sites))
+        for kind, effect in of_trees().items()
+    ]
     return (
         "# Effects\n\nWhat a model can have beside its rigid body. `effects=[site/kind, ...]` switches it on. "
         "A diagnosis looks for the effects of the *vocabulary* first, and for the others if these leave something over."
         f"\n\n{table(('effect', 'law', 'sites', 'vocabulary'), rows)}\n\n"
         "The sites `joint`, `drive`, `drives`, `sensor`, `link` and `base` are those of a "
-        "[robot from a model file](../../howto/robot.md). Some effects act otherwise there:\n\n"
+        "[robot from a model file](../../howto/robot.md). Some effects exist or act otherwise only there:\n\n"
         f"{table(('effect', 'law', 'sites'), trees)}\n"
     )
 

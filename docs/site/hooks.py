@@ -8,13 +8,15 @@ from mkdocs.structure.pages import Page
 from option_pages import option_pages
 from pictures import effect_picture
 
+from wipx.effects.catalogue import kinds
+
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages of options and effects; they exist during a build only."""
     for path, text in {**option_pages(), **effect_pages()}.items():
         files.append(File.generated(config, path, content=text))
-        if path.startswith("reference/effects/") and not path.endswith("index.md"):
-            kind = path.rpartition("/")[2].removesuffix(".md")
+        kind = path.removeprefix("reference/effects/").removesuffix(".md")
+        if kind in kinds():
             files.append(File.generated(config, path.replace(".md", ".svg"), content=effect_picture(kind)))
     return files
 

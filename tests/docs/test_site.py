@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from wipx.effects.catalogue import kinds
+from wipx.effects.catalogue import kinds, of_trees
 from wipx.recordings.robot_file import robot_from_mapping
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -40,9 +40,10 @@ def test_every_option_and_each_of_its_keys_is_on_a_page(path: Path):
     assert all(f"`{key}`" in section or f"`{key}." in section or f"\n{key}:" in section for key in keys)
 
 
-@pytest.mark.parametrize("kind", kinds())
-def test_every_effect_has_a_page_with_its_law_parameters_and_source(kind: str):
-    effect, page = kinds()[kind], effect_pages()[f"reference/effects/{kind}.md"]
+@pytest.mark.parametrize("name", [*kinds(), *(f"trees/{kind}" for kind in of_trees())])
+def test_every_effect_has_a_page_with_its_law_parameters_and_source(name: str):
+    known = of_trees() if name.startswith("trees/") else kinds()
+    effect, page = known[name.removeprefix("trees/")], effect_pages()[f"reference/effects/{name}.md"]
     assert effect.law in page
     assert effect.source in page
     assert all(f"`{parameter.name}`" in page and parameter.meaning in page for parameter in effect.parameters)

@@ -40,6 +40,7 @@ EXACT = {
     "spring": {"j0/spring": {"k": 3.0, "q0": 0.5}},
     "rotor": {"j0/rotor_inertia": {"J": 0.1}},
     "gain": {"actuator_j0/gain": {"k": 0.7}, "actuator_j1/gain": {"k": 0.7}},
+    "kp and kd": {"actuator_j1/kp": {"factor": 0.8}, "actuator_j2/kd": {"factor": 1.3}},
     "offset": {"actuator_j0/offset": {"F_0": 0.3}, "actuator_j1/offset": {"F_0": 0.3}},
     "saturation": {"actuator_j0/saturation": {"F_max": 1.0}, "actuator_j1/saturation": {"F_max": 1.0}},
     "lag": {"actuator_j0/lag": {"tau": 0.03}, "actuator_j2/lag": {"tau": 0.01}},

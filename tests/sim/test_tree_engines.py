@@ -41,6 +41,8 @@ TRANSMISSION = {
     "actuator_j0/lag": {"tau": 0.01},
     "actuator_j1/saturation": {"F_max": 2.0},
     "actuator_j1/ripple": {"A": 0.2, "n": 6.0, "phase": 0.3},
+    "actuator_j1/kp": {"factor": 0.8},
+    "actuator_j2/kd": {"factor": 1.3},
     "actuator_j2/backlash": {"gap": 0.02},
     "j1/rotor_inertia": {"J": 0.02},
     "j2/spring": {"k": 1.0, "q0": 0.2},

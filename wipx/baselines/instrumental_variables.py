@@ -230,8 +230,8 @@ def _signals(model: Model, motion: Motion) -> Signals:
     for i, site in enumerate(plant.actuated):
         j, drive = plant.joints.index(site), plant.drives[site]
         if drive.kind == "position":
-            force = model.parameters[f"{site}.kp"] * (commands[:, i] - motion.coordinates[:, j])
-            force = force - model.parameters[f"{site}.kd"] * motion.rates[:, j]
+            stiffness, damping = model.servo(site)
+            force = stiffness * (commands[:, i] - motion.coordinates[:, j]) - damping * motion.rates[:, j]
             forces[:, j] = force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
         else:
             forces[:, j] = model.parameters[f"{site}.gain"] * commands[:, i]

@@ -6,7 +6,7 @@ import numpy as np
 
 from wipx.core.load import BALANCE
 from wipx.core.model import Model, ModelBatch
-from wipx.effects.catalogue import kind_of, kinds
+from wipx.effects.catalogue import kind_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
@@ -42,8 +42,9 @@ def linearise_completed(model: Model) -> LinearModel:
     for name, values in model.effects.items():
         linear = kind_of(name).linear_at_rest
         if linear:
-            felt = effects.setdefault(f"{name.partition('/')[0]}/{linear}", {})
-            for symbol in kinds()[linear].neutral.keys() & values.keys():
+            same = f"{name.partition('/')[0]}/{linear}"
+            felt = effects.setdefault(same, {})
+            for symbol in kind_of(same).neutral.keys() & values.keys():
                 felt[symbol] = felt.get(symbol, 0.0) + values[symbol]
     balance = effects.get(BALANCE, {}).get("theta_eq", 0.0)
     return _slopes(Model(model.plant, model.parameters, effects), balance)

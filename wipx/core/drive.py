@@ -11,6 +11,7 @@ BEFORE_THE_MOTOR = (
     "speed_limit",
     "lag",
 )  # effects that its recorded torque has in it
+OF_THE_LOOP = ("kp", "kd")  # effects that only a position drive has; factors of its numbers
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ class Drive:
 
     def shows(self, kind: str, *, at_joint: bool) -> bool:
         """Whether recordings can show an effect of the drive, or of its joint, beside the recorded command."""
+        if kind in OF_THE_LOOP:
+            return self.kind == "position" and (kind != "kd" or self.kd > 0.0)
         if at_joint:
             return self.logged != "link" or kind in ("rotor_inertia", "spring")
         return self.logged == "command" or kind not in BEFORE_THE_MOTOR

@@ -51,6 +51,17 @@ class Model:
         effect, _, symbol = name.rpartition(".")
         return self.effects[effect][symbol]
 
+    def servo(self, joint: str) -> tuple[float, float]:
+        """Stiffness and damping of the position drive of a joint, with the effects that change them.
+
+        Units are N m/rad and N m s/rad, or N/m and N s/m where the joint slides.
+        """
+        kp, kd = (
+            self.parameters[f"{joint}.{kind}"] * self.effects.get(f"actuator_{joint}/{kind}", {}).get("factor", 1.0)
+            for kind in ("kp", "kd")
+        )
+        return kp, kd
+
     def with_values(self, values: Mapping[str, float]) -> "Model":
         """A copy in which the named numbers are replaced."""
         parameters = dict(self.parameters)

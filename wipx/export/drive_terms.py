@@ -140,13 +140,16 @@ class _Path:
 
     def _source(self, gain: float) -> tuple[tuple[float, float] | None, float]:
         """Stiffness and damping of a servo, or force per unit of the command."""
-        parameters = self.model.parameters
         if self.is_servo:
             if self.rate is not None:
                 self.said.append(
                     approximated(f"{self.joint}.rate", f"a continuous servo in place of one at {self.rate:g} Hz")
                 )
-            return (gain * parameters[f"{self.joint}.kp"], gain * parameters[f"{self.joint}.kd"]), 1.0
+            for kind, name in (("kp", "stiffness"), ("kd", "damping")):
+                if self.values(kind) is not None:
+                    self.say(kind, exact, f"{name} of the position actuator")
+            stiffness, damping = self.model.servo(self.joint)
+            return (gain * stiffness, gain * damping), 1.0
         return None, self._per_unit(gain)
 
     def _line(self) -> SpeedLine | None:

@@ -230,7 +230,7 @@ def _asked(model: Model, site: str, command: np.ndarray, coordinate: np.ndarray)
         return command * p["input_gain"]
     if drive.kind == "torque":
         return command * p[f"{site}.gain"]
-    force = (command - coordinate) * p[f"{site}.kp"]
+    force = (command - coordinate) * model.servo(site)[0]
     return force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
 
 

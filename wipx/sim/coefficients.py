@@ -17,7 +17,7 @@ from wipx.core.effect import Columns, Effect
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.tree import Tree
-from wipx.effects.catalogue import kind_of, kinds
+from wipx.effects.catalogue import kind_of, kinds, of_trees
 from wipx.effects.payload import loaded
 from wipx.sim import body as B
 from wipx.sim import rows as R
@@ -104,7 +104,7 @@ def _rows(effect: Effect, values: Columns, body: Columns) -> Iterator[tuple[str,
 def _neutral_block(known: tuple[str, ...]) -> np.ndarray:
     """Rows of a joint without any effect, shape (BLOCK,): an absent effect equals one at its neutral values."""
     rows = np.zeros(R.BLOCK)
-    for effect in (kinds()[kind] for kind in known):
+    for effect in (*(kinds()[kind] for kind in known), *of_trees().values()):
         neutral = {symbol: np.array([value]) for symbol, value in effect.neutral.items()}
         for row, value in _rows(effect, neutral, {}):
             for name in (row, f"SENSOR_{row}"):
@@ -265,11 +265,11 @@ def _tree(f: _Filler, tree: Tree) -> Any:
 
 
 def _servo(f: _Filler, site: str, drive: Drive) -> None:
-    """The loop of a position drive."""
+    """The loop of a position drive; its rows hold the factors by which effects change its numbers."""
     j = joint_index(f.plant, site)
     f.has[j, R.ON_SERVO] = True
-    f.joints[j, R.SERVO_KP] = f.batch.column(f"{site}.kp")
-    f.joints[j, R.SERVO_KD] = f.batch.column(f"{site}.kd")
+    f.joints[j, R.SERVO_KP] *= f.batch.column(f"{site}.kp")
+    f.joints[j, R.SERVO_KD] *= f.batch.column(f"{site}.kd")
     f.joints[j, R.SERVO_LIMIT] = NO_LIMIT if drive.limit is None else drive.limit
     f.joints[j, R.SERVO_PERIOD] = 0.0 if drive.rate is None else 1.0 / drive.rate
     f.on[R.ON_TIME] |= drive.rate is not None

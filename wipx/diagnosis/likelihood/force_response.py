@@ -55,7 +55,8 @@ def drive_force(model: Model, motion: Mapping[str, np.ndarray], joint: str) -> n
     if drive.kind == "torque":
         return gain * p[f"{joint}.gain"] * command
     column = plant.columns[joint]
-    force = p[f"{joint}.kp"] * (command - motion[column]) - p[f"{joint}.kd"] * motion[f"{column}_dot"]
+    stiffness, damping = model.servo(joint)
+    force = stiffness * (command - motion[column]) - damping * motion[f"{column}_dot"]
     return gain * (force if drive.limit is None else np.clip(force, -drive.limit, drive.limit))
 
 
