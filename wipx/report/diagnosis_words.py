@@ -68,7 +68,7 @@ def p_value(value: float) -> str:
 
 def symbol_of(name: str) -> str:
     """The symbol in the name "site/kind.symbol" of a number."""
-    return name.rpartition(".")[2]
+    return name.rpartition(".")[2] if "/" in name else name
 
 
 def value_in_words(estimate: Estimate) -> str:

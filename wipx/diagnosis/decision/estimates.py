@@ -135,7 +135,7 @@ def doubt_of_spread(fitter: Fitter, fit: Fit) -> np.ndarray:
 
 
 def _meaning(model: Model, name: str) -> str:
+    if name in model.plant.parameters:
+        return model.plant.parameters[name].meaning
     effect, _, symbol = name.rpartition(".")
-    if not effect:
-        return model.plant.parameters[symbol].meaning
     return next(p.meaning for p in effect_of(effect, model.plant).parameters if p.name == symbol)

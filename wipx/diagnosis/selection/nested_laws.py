@@ -149,7 +149,7 @@ def reduced_values(fit: Fit) -> dict[str, float]:
     found = {}
     for name, value in fit.hypothesis.values.items():
         effect, _, symbol = name.rpartition(".")
-        contains = kind_of(effect).contains if effect else None
+        contains = kind_of(effect).contains if "/" in effect else None
         if contains is not None:
             found[f"{simple_law(effect)}.{contains.symbols.get(symbol, symbol)}"] = value
     for effect in fit.effects:

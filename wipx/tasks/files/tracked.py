@@ -127,9 +127,9 @@ def _swept(job: Job) -> str:
 
 
 def _unit(name: str, plant: Plant) -> str:
-    effect, _, symbol = name.rpartition(".")
-    if not effect:
+    if name in plant.parameters:
         return plant.parameters[name].unit
+    effect, _, symbol = name.rpartition(".")
     angular = plant.is_angular(effect.partition("/")[0])
     return next(p.unit(angular=angular) for p in effect_of(effect, plant).parameters if p.name == symbol)
 
