@@ -25,7 +25,8 @@ def robot(tmp_path: Path) -> Path:
     folder = tmp_path / "arm"
     folder.mkdir()
     (folder / "arm.xml").write_text(ARM, encoding="utf-8")
-    (folder / "robot.yaml").write_text("plant: robot\nmodel: arm.xml\nuncertainty: {hand.mass: 0.1}\n", encoding="utf-8")
+    description = "plant: robot\nmodel: arm.xml\nuncertainty: {hand.mass: 0.1}\n"
+    (folder / "robot.yaml").write_text(description, encoding="utf-8")
     model = read_robot(folder / "robot.yaml").model.with_effects(HIDDEN)
     rng, t = np.random.default_rng(5), np.arange(0.0, 3.0, 0.005)
     for k in range(2):
