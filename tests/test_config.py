@@ -123,9 +123,11 @@ def test_an_annotation_that_no_configuration_can_hold_is_a_defect():
 
 
 def composed(path: Path) -> dict[str, Any]:
-    """An option, with parts of other groups at its own keys as Hydra composes them."""
+    """An option, with the one that it extends and parts of other groups at its own keys as Hydra composes them."""
     content = yaml.safe_load(path.read_text())
     for item in content.pop("defaults", []):
+        if isinstance(item, str) and item != "_self_":
+            content = {**composed(path.with_name(f"{item}.yaml")), **content}
         for place, option in item.items() if isinstance(item, dict) else ():
             group, _, key = place.lstrip("/").partition("@")
             if "." not in key:

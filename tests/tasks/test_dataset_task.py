@@ -149,7 +149,9 @@ def test_the_task_leaves_pictures_and_says_where_the_training_set_is(program, tr
     ],
 )
 def test_settings_at_fault_are_refused_in_one_line(program, trials: Path, arguments: tuple[str, ...], message: str):
-    answer = program(*TYPICAL, f"target.path={trials}", *arguments)
+    changed = [argument.partition("=")[0] for argument in arguments]
+    kept = [argument for argument in TYPICAL if argument.partition("=")[0] not in changed]
+    answer = program(*kept, f"target.path={trials}", *arguments)
     assert answer.status == 2
     assert message in answer.error
     assert len(answer.error.splitlines()) == 1

@@ -66,7 +66,8 @@ def test_margins_and_recovered_loads_come_from_the_command_line_once(program: Pr
     ],
 )
 def test_what_cannot_be_compared_is_refused_in_one_line(program: Program, tmp_path: Path, argument: str, message: str):
-    answer = program(*QUICK, argument)
+    kept = [other for other in QUICK if other.partition("=")[0] != argument.partition("=")[0]]
+    answer = program(*kept, argument)
     assert answer.status == 2
     assert message in answer.error
     assert answer.error.count("\n") == 1
