@@ -1,13 +1,15 @@
 """Inverse dynamics against MuJoCo's."""
 
 from pathlib import Path
+from typing import Any
 
-import mujoco
 import numpy as np
+import pytest
 
 from wipx.recordings.robot_model import read_tree
 from wipx.sim.tree.inverse import needed_forces
 
+mujoco: Any = pytest.importorskip("mujoco")
 TREE = """<mujoco><worldbody><body name="cart"><inertial pos="0 0 0.1" mass="2" diaginertia="0.02 0.02 0.01"/>
 <joint name="way" type="slide" axis="1 0 0" armature="0.3"/>
 <body name="left" pos="0 0.1 0.3"><inertial pos="0.1 0 -0.2" mass="0.8" diaginertia="0.01 0.01 0.002"/>

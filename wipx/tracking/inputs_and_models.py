@@ -42,8 +42,8 @@ def log_models(client: "MlflowClient", run_id: str, out: Path, models: Mapping[s
     """
     if not models or client.search_model_versions(f"run_id = '{run_id}'"):
         return
-    import mlflow.onnx
     import onnx
+    from mlflow import onnx as onnx_models
     from mlflow.exceptions import MlflowException
 
     for name, file in models.items():
@@ -51,7 +51,7 @@ def log_models(client: "MlflowClient", run_id: str, out: Path, models: Mapping[s
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder) / MODEL
             signature = _signature(graph)
-            mlflow.onnx.save_model(graph, place, signature=signature, pip_requirements=REQUIREMENTS)
+            onnx_models.save_model(graph, place, signature=signature, pip_requirements=REQUIREMENTS)
             client.log_artifacts(run_id, str(place), MODEL)
         try:
             client.create_registered_model(name)

@@ -3,7 +3,7 @@
 A shared view is what the button "Share" of MLflow's runs page leaves: a tag of the experiment that a link names.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 TABLE, CHARTS = "table", "charts"  # names of the shared views
@@ -82,7 +82,7 @@ VIEWS = {
 }  # by task
 
 
-def compared_by(view: View, values: dict[str, Collection[str]]) -> str | None:
+def compared_by(view: View, values: Mapping[str, Collection[str]]) -> str | None:
     """The option by which runs are compared: the first that has several values; None where none has.
 
     Args:

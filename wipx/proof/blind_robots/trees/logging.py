@@ -90,7 +90,7 @@ def record(robot: Robot, truth: Real, control: Control, scenario: Scenario, sett
         return None
     del places
     rows = scenario.rows
-    columns = {"t": np.round(plan.instants[rows], DECIMALS)}
+    columns: dict[str, np.ndarray] = {"t": np.round(plan.instants[rows], DECIMALS)}
     for j, name in enumerate(robot.joints):
         columns[name] = np.round(shown[rows, j], DECIMALS + 2) + 0.0
     if settings.rate_noise is not None:
