@@ -39,6 +39,16 @@ def test_an_example_is_recorded_within_its_limits_and_lacks_physics(program, nam
     assert max(errors) > 3.0
 
 
+def test_a_humanoid_is_recorded_while_it_balances(program, tmp_path: Path):
+    made = program(
+        "task=example", "task.robot=humanoid", "task.path=robot", "task.runs=1", "task.duration=4", "sim=mujoco"
+    )
+    assert (made.status, made.error) == (0, "")
+    recording = RecordingSource(path=str(tmp_path / "robot")).load()[0]
+    assert 0.1 < recording["pitch"].min() < recording["pitch"].max() < 0.6
+    assert recording["left_elbow"].max() - recording["left_elbow"].min() > 0.2
+
+
 def test_an_unknown_example_lists_those_that_there_are(program):
     answer = program("task=example", "task.robot=dog", "task.path=robot")
     assert answer.status == 2

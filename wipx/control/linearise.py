@@ -9,6 +9,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.effects.catalogue import kind_of
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
+from wipx.sim.tree.inverse import forces_of
 
 STEP = 1e-5  # [s] of one simulated step, from which accelerations are read off
 REACH = 1e-4  # [m, rad, m/s, rad/s, N, N m] of the differences
@@ -30,6 +31,27 @@ class LinearModel:
 def linearise(model: Model) -> LinearModel:
     """The rigid body of a model about q = 0, without its effects, by differences of simulated accelerations."""
     return _slopes(Model(model.plant, model.parameters, {}), 0.0)
+
+
+def linearise_about(model: Model, positions: np.ndarray) -> LinearModel:
+    """A robot from a model file about an equilibrium, by differences of its inverse dynamics; without dry friction.
+
+    Args:
+        model: The robot; effects at its links and at its base count, others do not.
+        positions: Of the equilibrium, shape (joints,) [rad or m].
+    """
+    joints, zero, one = len(positions), np.zeros((len(positions),) * 2), np.eye(len(positions))
+    still = forces_of(model, positions[None], zero[:1], zero[:1])
+    mass = (forces_of(model, positions + zero, zero, one) - still).T
+    ahead, behind = (forces_of(model, positions + reach * one, zero, zero) for reach in (REACH, -REACH))
+    stiffness = ((ahead - behind) / (2.0 * REACH)).T
+    damping = np.diag([model.parameters[f"{joint}.damping"] for joint in model.plant.joints])
+    inputs = np.zeros((joints, len(model.plant.commands)))
+    for k, joint in enumerate(model.plant.actuated):
+        inputs[model.plant.joints.index(joint), k] = model.parameters[f"{joint}.gain"]
+    slopes = np.linalg.solve(mass, np.hstack([-stiffness, -damping, inputs]))
+    a = np.block([[zero, one], [slopes[:, : 2 * joints]]])
+    return LinearModel(a, np.concatenate([np.zeros_like(inputs), slopes[:, 2 * joints :]]))
 
 
 def linearise_completed(model: Model) -> LinearModel:

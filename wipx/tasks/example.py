@@ -7,14 +7,14 @@ the emulated robot moves and what physics it has that its model lacks.
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
+from wipx.control.whole_body import WholeBodyLoop, WholeBodyLqr
 from wipx.core.drive import Drive
-from wipx.core.errors import InputError, check_positive, unknown_name
+from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import robot_plant
 from wipx.recordings.robot_file import read_robot
@@ -23,10 +23,11 @@ from wipx.recordings.strict_yaml import load_mapping
 from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Simulator
 from wipx.tasks.files.results import write_csv, written_together
+from wipx.tasks.shared.emulated_tree import SECRET, emulated_tree, example_folder
 from wipx.tasks.shared.job import Job
 
-SECRET = "emulated.yaml"
 FREQUENCIES = (0.15, 0.35, 0.6)  # [Hz] of the three sines, each times 0.8 to 1.2
+RISE = 2.0  # [s] over which the sines of a robot that balances grow from zero
 
 
 @dataclass(frozen=True)
@@ -48,20 +49,17 @@ class ExampleRobot:
     def run(self, job: Job) -> None:
         """Write the model file, robot.yaml and recordings."""
         check_positive(runs=self.runs, duration=self.duration)
-        home = Path(str(files("wipx"))) / "robots"
-        names = sorted(path.name for path in home.iterdir() if (path / ROBOT_FILE).is_file())
-        if self.robot not in names:
-            raise unknown_name("example", self.robot, names, "task.robot")
+        home = example_folder(self.robot)
         folder = Path(self.path).expanduser()
         if (folder / ROBOT_FILE).exists():
             raise InputError(f"{folder / ROBOT_FILE} is there already; give another task.path")
         rng = np.random.default_rng(job.seed)
         with written_together(folder) as draft:
-            for path in (home / self.robot).iterdir():
+            for path in home.iterdir():
                 if path.name != SECRET:
                     shutil.copyfile(path, draft / path.name)
             nominal = read_robot(draft / ROBOT_FILE).model
-            said = load_mapping(home / self.robot / SECRET)
+            said = load_mapping(home / SECRET)
             for k in range(self.runs):
                 write_csv(draft / f"r{k + 1}.csv", self._recorded(nominal, said, job.part("sim"), rng))
         print(f"written: {folder}\nnext: python -m wipx task=diagnose recordings.path={self.path}")
@@ -69,7 +67,9 @@ class ExampleRobot:
     def _recorded(
         self, nominal: Model, said: Mapping[str, object], simulator: Simulator, rng: np.random.Generator
     ) -> dict[str, np.ndarray]:
-        """Columns of one run: the emulated robot follows sines under position control."""
+        """Columns of one run: the emulated robot follows sines under position control, or while it balances."""
+        if "posture" in said:
+            return self._balanced(said, simulator, rng)
         joints = nominal.plant.joints
         emulated = _emulated(nominal, said)
         rate, noise = cast(float, said["rate"]), cast(Mapping[str, float], said["noise"])
@@ -88,6 +88,19 @@ class ExampleRobot:
                 force = drive.kp * (target[:, j] - q[:, j]) - drive.kd * v[:, j]
                 columns[f"u_{joint}"] = force + noise["force"] * rng.normal(size=len(t))
         return columns
+
+    def _balanced(
+        self, said: Mapping[str, object], simulator: Simulator, rng: np.random.Generator
+    ) -> dict[str, np.ndarray]:
+        """Columns of one run of a robot that balances by the regulator of its whole body."""
+        robot = emulated_tree(self.robot)
+        loop = WholeBodyLoop(WholeBodyLqr(rate=cast(float, said["rate"])), robot.nominal, robot.posture)
+        t = np.arange(round(self.duration * loop.rate)) / loop.rate
+        joints, reach = robot.nominal.plant.joints, cast(Mapping[str, float], said["reach"])
+        sines = _sines(t, np.zeros(len(joints)), np.array([reach.get(joint, 0.0) for joint in joints]), rng)
+        rising = np.minimum(t / RISE, 1.0)[:, None] * sines
+        reference = np.hstack([rising, np.gradient(rising, 1.0 / loop.rate, axis=0)])
+        return robot.driven(robot.emulated, loop, reference, simulator, rng)
 
 
 def _emulated(nominal: Model, said: Mapping[str, object]) -> Model:
