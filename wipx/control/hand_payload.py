@@ -87,7 +87,8 @@ class HandPayload:
         if not ORDER < length < len(positions):
             raise InputError(f"payload: {length} rows to smooth over, expected {ORDER + 1} to {len(positions) - 1}")
         inside = slice(length // 2, -(length // 2))  # where a polynomial has rows on both sides
-        motion = [savgol_filter(positions, length, ORDER, deriv=n, delta=period, axis=0)[inside] for n in range(3)]
+        smooth = [savgol_filter(positions, length, ORDER, deriv=n, delta=period, axis=0) for n in range(3)]
+        motion = [np.asarray(each)[inside] for each in smooth]
         empty, one = (forces_of(m, *motion)[:, free] for m in (model, self.loaded(model, 1.0)))
         damping = np.array([model.parameters[f"{model.plant.joints[i]}.damping"] for i in free])
         needed = -(empty + damping * motion[1][:, free]).ravel()
