@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control tables dashboard test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
+.PHONY: help setup demo hardware-demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control tables dashboard test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,6 +25,9 @@ $(READY): requirements.lock pyproject.toml
 
 demo: $(READY)  ## the whole chain on an emulated testbed, one page (PROFILE=full: as many loads and trials as the paper); RECORDINGS=folder diagnoses that robot instead
 	$(PY) -m wipx $(if $(RECORDINGS),task=diagnose "recordings.path='$(RECORDINGS)'",task=pipeline$(SUFFIX))
+
+hardware-demo: $(READY)  ## an emulated robot on a CAN bus: record, diagnose, find what it conceals, balance a payload (under 3 minutes)
+	$(PY) -m wipx +experiment=hardware_demo
 
 real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx +experiment=real_recordings task.page=docs/real_recordings.md
@@ -82,12 +85,14 @@ dashboard: $(READY)  ## MLflow in a browser: runs, comparisons, files (PORT=5001
 
 # A process of the tests has one core; threads of linear algebra on small matrices would only wait for each other.
 ONE_THREAD := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+# Tests of one file share what is expensive to set up or to compile.
+EACH_CORE := -n auto --dist loadfile
 
 test: $(READY)  ## run the tests (without the slow ones)
-	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow"
+	$(ONE_THREAD) $(PY) -m pytest -q $(EACH_CORE) -m "not slow"
 
 test-fresh: $(READY)  ## run the tests on fresh random numbers, statistical claims ten times (SEED=N: those of an earlier run)
-	$(ONE_THREAD) $(PY) -m pytest -q -n auto -m "not slow" --seed=$(or $(SEED),fresh)
+	$(ONE_THREAD) $(PY) -m pytest -q $(EACH_CORE) -m "not slow" --seed=$(or $(SEED),fresh)
 
 test-slow: $(READY)  ## run the slow tests
 	$(PY) -m pytest -q -m "slow and not kill and not launchers"
@@ -99,7 +104,7 @@ test-launchers: $(READY)  ## compare the launchers' results (Slurm needs Debian'
 	$(PY) -m pytest -q -m launchers -rs
 
 test-bounds: $(READY)  ## run the tests with compiled code that checks its indices (slow)
-	$(ONE_THREAD) NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q -n auto -m "not slow"
+	$(ONE_THREAD) NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(CURDIR)/runs/bounds $(PY) -m pytest -q $(EACH_CORE) -m "not slow"
 
 check: $(READY)  ## lint, formatting and types
 	$(PY) -m ruff check

@@ -26,6 +26,7 @@ settings.register_profile(FRESH, deadline=None)
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--seed", default="0", help=f"of what tests draw at random: a number, or {FRESH}")
+    parser.addoption("--update-docs", action="store_true", help="write the tables of docs/ that tests make")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -3,16 +3,17 @@
 import errno
 import subprocess
 import sys
-from dataclasses import dataclass
+import types
 from pathlib import Path
 
 import pytest
 import yaml
+from stub_task import StubTask
+from tasks.conftest import Answer, program_in
 
 from wipx.app import configuration_folder, explanation
 from wipx.renamed import renamed
 
-STUB_APP = Path(__file__).with_name("stub_app.py")
 SLOW_PACKAGES = {"torch", "mlflow", "pybullet", "numba", "scipy", "matplotlib", "plotly", "pandas"}
 REPORT_IMPORTS = f"""
 import sys
@@ -23,18 +24,15 @@ sys.exit(status)
 """
 
 
-@dataclass(frozen=True)
-class Answer:
-    status: int
-    out: str
-    error: str
-
-
 class CommandLine:
-    """Runs the program in a folder of its own, with the options of `stub_app` beside those that ship."""
+    """Runs the program in a folder, with the options of `stub_task` beside those that ship."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder, self._run = folder, program_in(folder, capsys, monkeypatch)
+        module = types.ModuleType("wipx.stub")
+        vars(module)["StubTask"] = StubTask
+        monkeypatch.setattr(StubTask, "__module__", "wipx.stub")
+        monkeypatch.setitem(sys.modules, "wipx.stub", module)
         self.options = folder / "options"
         root = yaml.safe_load((configuration_folder() / "config.yaml").read_text())
         groups = {
@@ -46,15 +44,20 @@ class CommandLine:
             file.parent.mkdir(parents=True)
             file.write_text("_target_: wipx.stub.StubTask\nbehaviour: succeed\n")
 
-    def __call__(self, *arguments: str, program: tuple[str, ...] = (str(STUB_APP),)) -> Answer:
-        command = [sys.executable, *program, "--config-dir", str(self.options), "task=stub", *arguments]
-        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=60, check=False)
-        return Answer(done.returncode, done.stdout, done.stderr)
+    def __call__(self, *arguments: str) -> Answer:
+        return self._run(f"--config-dir={self.options}", "task=stub", *arguments)
 
 
 @pytest.fixture
-def command_line(tmp_path: Path) -> CommandLine:
-    return CommandLine(tmp_path)
+def command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> CommandLine:
+    return CommandLine(tmp_path, capsys, monkeypatch)
+
+
+def in_a_process(folder: Path, *command: str) -> Answer:
+    done = subprocess.run(
+        [sys.executable, *command], cwd=folder, capture_output=True, text=True, timeout=60, check=False
+    )
+    return Answer(done.returncode, done.stdout, done.stderr)
 
 
 @pytest.mark.parametrize(
@@ -188,14 +191,20 @@ def test_a_failing_job_fails_its_sweep_but_not_the_other_jobs(command_line: Comm
 
 
 @pytest.mark.parametrize("question", ["--help", "--cfg=job"])
-def test_questions_are_answered_without_slow_imports(command_line: CommandLine, question: str):
-    answer = command_line(question, program=("-c", REPORT_IMPORTS))
+def test_questions_are_answered_without_slow_imports(tmp_path: Path, question: str):
+    answer = in_a_process(tmp_path, "-c", REPORT_IMPORTS, question)
     assert (answer.status, answer.error) == (0, "")
     assert answer.out.endswith("imported []\n")
 
 
+def test_the_status_of_the_process_is_that_of_the_run(tmp_path: Path):
+    answer = in_a_process(tmp_path, "-m", "wipx", "sed=1")
+    assert (answer.status, answer.out) == (2, "")
+    assert answer.error.startswith("configuration: unknown key 'sed'; did you mean seed?")
+
+
 def test_help_lists_the_groups_and_shows_one_example_of_each_use(command_line: CommandLine):
-    text = command_line("--help", program=("-m", "wipx")).out
+    text = command_line("--help").out
     assert "tracking: mlflow, none" in text
     for example in ("task=identify", "task=predict", "-m ", "label='${chosen:optimizer}'", "--cfg job"):
         assert example in text

@@ -1,32 +1,29 @@
 """A sweep as a user starts it and asks about it."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tasks.conftest import program_in
 from test_app import CommandLine
 
 from wipx.core.errors import InputError
 from wipx.sweep import check_launcher
 
 
-def wipx(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "wipx", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-
-
-def test_a_sweep_tells_how_far_it_is_and_can_be_asked(tmp_path: Path):
-    with_stand_in = CommandLine(tmp_path)
-    answer = with_stand_in("-m", "name=mixed", "label='${task.behaviour}'", "task.behaviour=refuse,succeed")
+def test_a_sweep_tells_how_far_it_is_and_can_be_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    answer = CommandLine(tmp_path, capsys, monkeypatch)(
+        "-m", "name=mixed", "label='${task.behaviour}'", "task.behaviour=refuse,succeed"
+    )
     assert answer.status == 2
     assert "runs/mixed: 2 jobs: 1 done, 1 failed; why: task=status" in answer.error
 
-    asked = wipx(tmp_path, "task=status", "experiment=mixed")
-    assert (asked.returncode, asked.stderr) == (0, "")
-    assert "2 jobs: 1 done, 1 failed" in asked.stdout
-    assert "failed  refuse: r3.csv row 812: t decreases; sort or drop the row" in asked.stdout
+    asked = program_in(tmp_path, capsys, monkeypatch)("task=status", "experiment=mixed")
+    assert (asked.status, asked.error) == (0, "")
+    assert "2 jobs: 1 done, 1 failed" in asked.out
+    assert "failed  refuse: r3.csv row 812: t decreases; sort or drop the row" in asked.out
     (written,) = tmp_path.glob("runs/status/*/status.json")
     content = json.loads(written.read_text())
     assert [job["state"] for job in content["jobs"]] == ["failed", "done"]
@@ -42,11 +39,17 @@ def test_a_sweep_tells_how_far_it_is_and_can_be_asked(tmp_path: Path):
         (("-m", "seed=1,2", "tracking.uri=http://127.0.0.1:9"), "tracking.uri http://127.0.0.1:9: no answer"),
     ],
 )
-def test_a_sweep_that_cannot_be_is_refused_in_one_line(tmp_path: Path, arguments: tuple[str, ...], message: str):
-    answer = wipx(tmp_path, *arguments)
-    assert answer.returncode == 2
-    assert message in answer.stderr
-    assert answer.stderr.count("\n") == 1
+def test_a_sweep_that_cannot_be_is_refused_in_one_line(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    message: str,
+):
+    answer = program_in(tmp_path, capsys, monkeypatch)(*arguments)
+    assert answer.status == 2
+    assert message in answer.error
+    assert answer.error.count("\n") == 1
     assert not list(tmp_path.rglob("config.yaml"))
 
 

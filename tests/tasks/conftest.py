@@ -1,5 +1,6 @@
 """The program as a user calls it, and a folder of recordings that is free of faults."""
 
+import logging
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,20 +25,28 @@ class Answer:
 Program = Callable[..., Answer]
 
 
-@pytest.fixture
-def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Program:
-    """Runs `python -m wipx` with the arguments given, in this process and in a folder of its own."""
+def program_in(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Program:
+    """Runs `python -m wipx` with the arguments given, in this process and in a folder."""
 
-    def run(*arguments: str, tracking: str = "none") -> Answer:
-        monkeypatch.chdir(tmp_path)
+    def run(*arguments: str) -> Answer:
+        monkeypatch.chdir(folder)
         monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
-        monkeypatch.setattr(sys, "argv", ["wipx", f"tracking={tracking}", *arguments])
+        monkeypatch.setattr(sys, "argv", ["wipx", *arguments])
+        # Hydra closes the log handlers that there are; absl's closes the stream of pytest with it.
+        monkeypatch.setattr(logging, "_handlerList", [])
         capsys.readouterr()
         status = main()
         written = capsys.readouterr()
         return Answer(status, written.out, written.err)
 
     return run
+
+
+@pytest.fixture
+def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Program:
+    """The same in a folder of its own, untracked unless the test says otherwise."""
+    run = program_in(tmp_path, capsys, monkeypatch)
+    return lambda *arguments, tracking="none": run(f"tracking={tracking}", *arguments)
 
 
 @dataclass(frozen=True)

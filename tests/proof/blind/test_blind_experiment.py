@@ -1,33 +1,26 @@
 """`+experiment=blind` as a user meets it."""
 
-import subprocess
-import sys
-
 import pytest
 import yaml
+from tasks.conftest import Program
 
 
-def wipx(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "wipx", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-
-
-def test_help_names_the_experiment_and_its_profiles():
-    text = wipx("--help").stdout
+def test_help_names_the_experiment_and_its_profiles(program: Program):
+    text = program("--help").out
     assert "python -m wipx +experiment=blind" in text
     assert "profile: consistency_full, consistency_quick, full, quick" in text
 
 
 @pytest.mark.parametrize(("profile", "cases"), [("quick", 30), ("full", 300)])
-def test_one_switch_chooses_the_size(profile: str, cases: int):
-    task = yaml.safe_load(wipx("+experiment=blind", f"profile={profile}", "--cfg", "job").stdout)["task"]
+def test_one_switch_chooses_the_size(program: Program, profile: str, cases: int):
+    task = yaml.safe_load(program("+experiment=blind", f"profile={profile}", "--cfg=job").out)["task"]
     assert task["cases"] == cases
     assert 0 < task["baselines_cases"] < cases
 
 
 @pytest.mark.parametrize(("profile", "cases"), [("quick", 20), ("full", 200)])
-def test_dirty_robots_are_an_experiment_of_their_own(profile: str, cases: int):
-    task = yaml.safe_load(wipx("+experiment=dirty", f"profile={profile}", "--cfg", "job").stdout)["task"]
+def test_dirty_robots_are_an_experiment_of_their_own(program: Program, profile: str, cases: int):
+    task = yaml.safe_load(program("+experiment=dirty", f"profile={profile}", "--cfg=job").out)["task"]
     assert task["cases"] == cases
     assert task["tiers"] == ["dirty", "dirt_only"]
     assert 0 < task["baselines_cases"] < cases
@@ -43,9 +36,9 @@ def test_dirty_robots_are_an_experiment_of_their_own(profile: str, cases: int):
         ("task.tiers=[single]", "task.tiers: unknown tier 'single'"),
     ],
 )
-def test_a_slip_is_one_line_and_status_2(argument: str, message: str, tmp_path):
+def test_a_slip_is_one_line_and_status_2(program: Program, argument: str, message: str):
     chosen = () if argument.startswith("+experiment") else ("+experiment=blind",)
-    done = wipx(*chosen, argument, f"hydra.run.dir='{tmp_path / 'out'}'")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    done = program(*chosen, argument, "hydra.run.dir=out")
+    assert (done.status, done.out) == (2, "")
+    assert message in done.error
+    assert done.error.count("\n") == 1
