@@ -86,7 +86,7 @@ def test_recordings_have_the_columns_of_the_contract(heavy: Recording):
 
 def test_a_trial_that_follows_a_reference_records_it():
     bed = replace(BED, release_error=0.0)
-    reference = excitation(1, plant_of("wip"), np.random.default_rng(0))
+    reference = excitation("tracking", plant_of("wip"), np.random.default_rng(0))
     (run,) = record(bed, Trial("r.csv", 0.5, reference=reference))
     assert set(run.columns) == {*COLUMNS, "x_ref", "theta_ref", "x_dot_ref"}
     np.testing.assert_allclose(np.gradient(run["x_ref"], run.t)[1:-1], run["x_dot_ref"][1:-1], atol=2e-3)
@@ -229,7 +229,9 @@ def test_the_imu_errs_by_a_bias_and_wanders():
 def test_other_plants_stand_on_the_testbed_too(kind: str):
     wheel = {} if kind == "pendulum" else {"wheel_radius": RADIUS}
     bed = EmulatedTestbed(kind, {**PARAMETERS[kind], **wheel}, engine=BED.engine)
-    (run,) = record(bed, Trial("r.csv", 0.3, reference=excitation(3, plant_of(kind), np.random.default_rng(0))))
+    (run,) = record(
+        bed, Trial("r.csv", 0.3, reference=excitation("multisine", plant_of(kind), np.random.default_rng(0)))
+    )
     plant = plant_of(kind)
     assert {"t", "u", *plant.coordinates, *plant.rates} <= set(run.columns)
     assert run.duration > 0.29

@@ -9,7 +9,7 @@ import pytest
 from wipx.core.recording import Recording
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
-from wipx.tasks.pipeline import logged_slower
+from wipx.tasks.shared.driven import logged_slower
 
 SHORT = (
     "task.fitted=3",
@@ -29,13 +29,20 @@ SHORT = (
 def test_a_slower_log_has_the_mean_of_the_commands_and_the_rows_between_are_gone():
     t = np.array([0.0, 1.0, 3.0, 4.0, 6.0, 7.0])  # uneven
     fast = Recording("r", {"t": t, "x": t**2, "u": np.arange(6.0), "u_measured": -np.arange(6.0)})
-    slow = logged_slower(fast, 2)
+    slow = logged_slower(fast, 2, 1 / 1.5)
     np.testing.assert_array_equal(slow.t, [0.0, 3.0])
     np.testing.assert_array_equal(slow["x"], [0.0, 9.0])
     np.testing.assert_allclose(slow["u"], [2.0 / 3.0, 8.0 / 3.0])
     np.testing.assert_allclose(slow["u_measured"], -slow["u"])
     assert slow.periods == 2
-    assert logged_slower(fast, 1) is fast
+    assert logged_slower(fast, 1, 1 / 1.5) is fast
+
+
+def test_where_steps_were_skipped_rows_stay_as_close_as_they_were_asked_for():
+    t = np.concatenate([np.arange(0.0, 1.0, 0.01), np.arange(1.0, 2.0, 0.04), np.arange(2.0, 3.0, 0.01)])
+    slow = logged_slower(Recording("r", {"t": t, "u": np.ones(len(t))}), 4, 100.0)
+    np.testing.assert_allclose(np.diff(slow.t), 0.04, atol=1e-9)
+    np.testing.assert_allclose(slow["u"], 1.0)
 
 
 @pytest.mark.slow

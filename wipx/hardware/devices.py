@@ -3,12 +3,14 @@
 Limits and the loop are in `run`, the operator in `robot`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import TypeVar
 
 import numpy as np
 
+from wipx.core.loop_quality import LoopQuality, Overrun
 from wipx.core.recording import Recording
 from wipx.hardware.can_motor import CanMotor
 from wipx.hardware.imu import Imu, times
@@ -148,7 +150,7 @@ class Devices:
             name: Of the recording.
             source: Origin, for messages.
         """
-        pushes = Pushes(*np.array(self._pushes, dtype=float).reshape(-1, 5).T)
+        pushes = self._sent()
         answered = np.isfinite(pushes.angle)
         if np.count_nonzero(answered) < 3:
             return None
@@ -170,3 +172,32 @@ class Devices:
             "u_measured": motor.force(at_commands(pushes.torque))[1:],
         }
         return Recording(name, columns, source)
+
+    def quality(self, rate: float, overruns: Sequence[tuple[float, int]]) -> LoopQuality | None:
+        """How well the loop kept time since `begin`; None where it sent fewer than two commands.
+
+        Args:
+            rate: Of the loop [Hz].
+            overruns: As of `Pace`.
+        """
+        pushes, samples = self._sent(), self.imu.samples
+        sent_at, answered = pushes.sent_at, np.flatnonzero(np.isfinite(pushes.angle))
+        if len(sent_at) < 2:
+            return None
+        newest = np.searchsorted([sample.read_at for sample in samples], sent_at, side="right") - 1
+        before = np.searchsorted(answered, np.arange(1, len(sent_at))) - 1
+        known = before >= 0
+        return LoopQuality(
+            period=1.0 / rate,
+            period_errors=np.diff(sent_at) - 1.0 / rate,
+            imu_ages=sent_at - times(samples)[newest],
+            motor_ages=sent_at[1:][known] - sent_at[answered[before[known]]],
+            overruns=tuple(
+                Overrun(at - sent_at[0], int(np.searchsorted(sent_at, at)), skipped) for at, skipped in overruns
+            ),
+            lost_replies=tuple(sent_at[~np.isfinite(pushes.angle)] - sent_at[0]),
+            damaged_messages=self.imu.damaged,
+        )
+
+    def _sent(self) -> Pushes:
+        return Pushes(*np.array(self._pushes, dtype=float).reshape(-1, 5).T)

@@ -8,18 +8,19 @@ side [m] on it, `load 0 0 0` takes it off. It listens on this computer only.
 import argparse
 import os
 import select
-import socket
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 
 import numpy as np
 
+from wipx.core.errors import InputError
 from wipx.core.load import Load
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
 from wipx.hardware.emulated_devices import EmulatedImu, EmulatedMotor, EmulatedRobot, Surroundings
+from wipx.hardware.emulated_lines import CHUNK, CanProtocol, Line, SerialCan, SocketCan
 from wipx.hardware.mit_protocol import Ranges
 
 # Of conf/target/hardware.yaml.
@@ -33,93 +34,7 @@ PARAMETERS = {
 }
 START_ANGLE = 12.4  # [rad] of the wheel: it soon crosses the end of its range
 DEFAULTS = Surroundings(friction=1.0, damping=1.0, pitch_damping=0.02, angle_noise=4e-4, rate_noise=3e-3)
-CHUNK = 4096
-
-
-class Line:
-    """One end of a line: a TCP port that takes one caller at a time, or a pseudo-terminal."""
-
-    def __init__(self, *, pseudo_terminal: bool) -> None:
-        self._listening: socket.socket | None = None
-        self._caller: socket.socket | None = None
-        self._terminal: tuple[int, int] | None = None
-        if pseudo_terminal:
-            self._terminal = _open_pseudo_terminal()
-            self.name = os.ttyname(self._terminal[1])
-        else:
-            self._listening = socket.create_server(("127.0.0.1", 0))
-            self.name = f"socket://127.0.0.1:{self._listening.getsockname()[1]}"
-
-    @property
-    def waits_for(self) -> list[int]:
-        """File numbers that become readable when something comes."""
-        ends = (self._listening, self._caller)
-        return [self._terminal[0]] if self._terminal else [end.fileno() for end in ends if end is not None]
-
-    def read(self, ready: Sequence[int]) -> bytes:
-        """What has come; a new caller takes the place of the old one."""
-        if self._listening is not None and self._listening.fileno() in ready:
-            self._caller = self._listening.accept()[0]
-            self._caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._caller.setblocking(False)
-            return b""
-        if self._terminal and self._terminal[0] in ready:
-            return os.read(self._terminal[0], CHUNK)
-        if self._caller is not None and self._caller.fileno() in ready:
-            try:
-                data = self._caller.recv(CHUNK)
-            except OSError:
-                data = b""
-            if not data:
-                self._caller.close()
-                self._caller = None
-            return data
-        return b""
-
-    def write(self, data: bytes) -> None:
-        """Send; without a reader the data are lost, as on a serial line."""
-        try:
-            if self._terminal:
-                os.write(self._terminal[0], data)
-            elif self._caller is not None:
-                self._caller.send(data)
-        except OSError:
-            return
-
-
-def _open_pseudo_terminal() -> tuple[int, int]:
-    import pty  # not on every platform
-    import tty
-
-    master, slave = pty.openpty()  # the slave stays open, so that the master survives a caller that leaves
-    tty.setraw(master)
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    return master, slave
-
-
-class SerialCan:
-    """The slcan protocol (Lawicel) of a CAN adapter, over the frames of one motor."""
-
-    def __init__(self, frame: Callable[[int, bytes, float], tuple[int, bytes] | None]) -> None:
-        self._frame = frame
-        self._pending = b""
-
-    def receive(self, data: bytes, now: float) -> bytes:
-        """The adapter's answers, and the frames that come from the bus."""
-        *lines, self._pending = (self._pending + data).split(b"\r")
-        return b"".join(self._answer(line, now) for line in lines)
-
-    def _answer(self, line: bytes, now: float) -> bytes:
-        if line[:1] != b"t":
-            return {b"V": b"V1013\r", b"N": b"NA123\r", b"F": b"F00\r"}.get(line[:1], b"\r")
-        try:
-            frame_id, length = int(line[1:4], 16), int(line[4:5])
-            data = bytes.fromhex(line[5 : 5 + 2 * length].decode())
-        except ValueError:
-            return b"\a"
-        reply = self._frame(frame_id, data, now)
-        return b"z\r" + (b"" if reply is None else f"t{reply[0]:03X}{len(reply[1])}{reply[1].hex()}\r".encode())
+LINES = ("slcan", "socketcand", "pty")
 
 
 class Emulator:
@@ -130,7 +45,7 @@ class Emulator:
         surroundings: What its owner may not know.
         pitch: At which it is held [rad].
         rng: Draws the noise.
-        pseudo_terminal: Whether the lines are pseudo-terminals, not TCP ports.
+        lines: How it is reached: "slcan" or "socketcand" on TCP ports, "pty" for slcan on pseudo-terminals.
     """
 
     def __init__(
@@ -140,19 +55,25 @@ class Emulator:
         pitch: float,
         rng: np.random.Generator,
         *,
-        pseudo_terminal: bool,
+        lines: str,
     ) -> None:
         now = time.perf_counter()
         self.model = model
         self.robot = EmulatedRobot(model, surroundings, pitch, now)
-        self.can = Line(pseudo_terminal=pseudo_terminal)
-        self.serial = Line(pseudo_terminal=pseudo_terminal)
-        self.adapter = SerialCan(EmulatedMotor(self.robot, Ranges(), 1, 0, START_ANGLE).frame)
+        frame = EmulatedMotor(self.robot, Ranges(), 1, 0, START_ANGLE).frame
+        self.adapter: CanProtocol = SocketCan(frame) if lines == "socketcand" else SerialCan(frame)
+        self.can = Line(pseudo_terminal=lines == "pty", greeting=self.adapter.greeting)
+        self.serial = Line(pseudo_terminal=lines == "pty")
         self.imu = EmulatedImu(self.robot, surroundings, rng, now)
 
     def overrides(self) -> str:
         """What `python -m wipx` is given to reach it."""
-        can = f"target.can.interface=slcan target.can.channel={self.can.name} +target.can.sleep_after_open=0.0"
+        if isinstance(self.adapter, SocketCan):
+            host, port = self.can.name.removeprefix("socket://").split(":")
+            reached = f"+target.can.host={host} +target.can.port={port}"
+            can = f"target.can.interface=socketcand target.can.channel=can0 {reached}"
+        else:
+            can = f"target.can.interface=slcan target.can.channel={self.can.name} +target.can.sleep_after_open=0.0"
         return f"target=hardware target.emulated=true {can} target.imu.port={self.serial.name}"
 
     def run(self) -> None:
@@ -197,10 +118,28 @@ class Emulator:
         return "done"
 
 
+def _numbers(given: list[str]) -> Mapping[str, float]:
+    """Parameters of the command line, by name.
+
+    Raises:
+        InputError: one is no NAME=NUMBER.
+    """
+    numbers = {}
+    for text in given:
+        name, _, value = text.partition("=")
+        try:
+            numbers[name] = float(value)
+        except ValueError as error:
+            raise InputError(f"--parameter {text}, expected NAME=NUMBER") from error
+    return numbers
+
+
 def main() -> None:
     """Run the emulator that the command line describes."""
     parser = argparse.ArgumentParser(prog="python -m wipx.hardware.emulator", description=__doc__)
-    parser.add_argument("--pty", action="store_true", help="pseudo-terminals, as a USB adapter shows, in place of TCP")
+    said = "slcan and socketcand listen on TCP ports, pty is slcan on a pseudo-terminal, as a USB adapter shows"
+    parser.add_argument("--lines", choices=LINES, default="slcan", help=said)
+    parser.add_argument("--parameter", action="append", default=[], metavar="NAME=VALUE", help="of the robot [SI]")
     parser.add_argument("--pitch", type=float, default=0.0, help="at which the robot is held [rad]")
     parser.add_argument("--seed", type=int, help="of the noise")
     for name, default in asdict(DEFAULTS).items():
@@ -208,9 +147,12 @@ def main() -> None:
     given = vars(parser.parse_args())
     surroundings = Surroundings(**{name: given[name] for name in asdict(DEFAULTS)})
     plant = plant_of("wip")
-    model = Model(plant, plant.complete(PARAMETERS, "emulator"), {})
+    try:
+        model = Model(plant, plant.complete({**PARAMETERS, **_numbers(given["parameter"])}, "emulator"), {})
+    except InputError as error:
+        parser.error(str(error))
     rng = np.random.default_rng(given["seed"])
-    emulator = Emulator(model, surroundings, given["pitch"], rng, pseudo_terminal=given["pty"])
+    emulator = Emulator(model, surroundings, given["pitch"], rng, lines=given["lines"])
     print(emulator.overrides(), flush=True)
     try:
         emulator.run()

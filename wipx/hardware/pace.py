@@ -21,11 +21,11 @@ class Pace:
         rate: [Hz].
 
     Attributes:
-        overruns: Steps that were skipped because the one before ended late.
+        overruns: When a step ended so late that others were skipped [s], and how many.
     """
 
     def __init__(self, rate: float) -> None:
-        self.overruns = 0
+        self.overruns: list[tuple[float, int]] = []
         self._period = 1.0 / rate
         self._next = 0.0
 
@@ -37,11 +37,12 @@ class Pace:
     def wait(self) -> float:
         """Wait for the next step; returns the time [s]."""
         self._next += self._period
-        late = time.perf_counter() - self._next
+        ended = time.perf_counter()
+        late = ended - self._next
         if late > 0.5 * self._period:
             missed = ceil(late / self._period)
             self._next += missed * self._period
-            self.overruns += missed
+            self.overruns.append((ended, missed))
         asleep = self._next - time.perf_counter() - SPIN
         if asleep > 0.0:
             time.sleep(asleep)

@@ -8,13 +8,15 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
 from wipx.control.loop import Loop
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.load import Load
+from wipx.core.loop_quality import LoopQuality, quality_words
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
@@ -26,9 +28,39 @@ from wipx.hardware.run import TrialRun, run_trial
 from wipx.hardware.safety import DeviceError, Limits
 from wipx.hardware.settings import settings_from
 from wipx.hardware.target import Trial
+from wipx.hardware.trial_logs import LoggedBus, TrialLogs
 
 LOOK = 0.3  # [s] for which the sensors are watched before a trial
 LEAST_MESSAGES = 5  # of the IMU in that time
+SHOWN = 5  # overruns that are told
+
+
+class Operator(Protocol):
+    """Who sets a robot up."""
+
+    def set_up(self, request: str, trial: Trial, load: Load | None) -> None:
+        """Put a load on the robot, or none, and hold it still at the trial's pitch until the wheels take over.
+
+        Args:
+            request: The same for a person, one line.
+            trial: What is done.
+            load: What the robot carries.
+
+        Raises:
+            KeyboardInterrupt: nobody is there any more.
+        """
+        ...
+
+
+class Person:
+    """An operator at the terminal, who presses Enter when the robot is set up."""
+
+    def set_up(self, request: str, trial: Trial, load: Load | None) -> None:
+        """See `Operator`."""
+        try:
+            input(request)
+        except EOFError as error:
+            raise KeyboardInterrupt from error
 
 
 @dataclass(frozen=True)
@@ -47,6 +79,7 @@ class HardwareTarget:
         rest_rate: Largest pitch rate of a robot at rest [rad/s].
         priority: Of SCHED_FIFO, 1 to 99; 0 to go without.
         emulated: Whether the lines lead to `wipx.hardware.emulator`; recordings then say so.
+        logs: Folder that takes what `TrialLogs` leaves; None for nothing.
     """
 
     parameters: Mapping[str, float]
@@ -60,6 +93,7 @@ class HardwareTarget:
     rest_rate: float = 0.1
     priority: int = 0
     emulated: bool = False
+    logs: str | None = None
 
     def __post_init__(self) -> None:
         check_positive(pitch_tolerance=self.pitch_tolerance, rest_rate=self.rest_rate)
@@ -78,6 +112,11 @@ class HardwareTarget:
         """See `Target`."""
         return {name: settings_from(Load, given, f"target.weights.{name}") for name, given in self.weights.items()}
 
+    @property
+    def rail(self) -> float:
+        """See `Target`."""
+        return self._limits().rail
+
     def nominal(self) -> Model:
         """See `Target`."""
         plant = plant_of("wip")
@@ -93,28 +132,45 @@ class HardwareTarget:
             raise InputError(
                 "target=hardware: there is no operator (the input is not a terminal); run it from a terminal"
             )
+        yield from self.run_by(Person(), trials, loop)
+
+    def run_by(self, operator: Operator, trials: Sequence[Trial], loop: Loop) -> Iterator[Recording]:
+        """Run trials for which an operator sets the robot up; see `run`.
+
+        Raises:
+            InputError: as in `run`.
+            KeyboardInterrupt: a trial was interrupted; its recording has been yielded.
+        """
         for trial in trials:
             if trial.load is not None and trial.load not in self.loads:
                 raise unknown_name("load", trial.load, self.loads, "target.weights")
-        with self._connected() as devices:
+        with self._connected() as (devices, bus):
             for trial in trials:
-                yield from self._trial(devices, trial, loop)
+                yield from self._trial(devices, bus, trial, loop, operator)
 
-    def _trial(self, devices: Devices, trial: Trial, loop: Loop) -> Iterator[Recording]:
+    def _trial(
+        self, devices: Devices, bus: LoggedBus, trial: Trial, loop: Loop, operator: Operator
+    ) -> Iterator[Recording]:
         try:
-            self._wait_for_operator(devices, trial)
+            self._wait_for_operator(devices, trial, operator)
         except DeviceError as error:
             raise InputError(f"trial {trial.name}: {error}") from error
         kind = "emulated hardware" if self.emulated else "hardware"
         source = f"{kind}: {self.can.get('interface')} {self.can.get('channel')}, IMU on {self.imu['port']}"
-        run = run_trial(devices, trial, loop, self._limits(), priority=self.priority, source=source)
+        logs = TrialLogs(None if self.logs is None else Path(self.logs))
+        with logs.trial(bus, trial.name):
+            run = run_trial(devices, trial, loop, self._limits(), priority=self.priority, source=source)
         _tell(trial, run)
         if run.recording is not None:
             yield run.recording
+        if run.quality is not None:
+            logs.leave(trial.name, run.quality, run.end)
+        if run.interrupted:
+            raise KeyboardInterrupt
         if run.device_lost or run.recording is None:
             raise InputError(f"trial {trial.name}: stopped: {run.cut_short or 'it was too short to leave a recording'}")
 
-    def _wait_for_operator(self, devices: Devices, trial: Trial) -> None:
+    def _wait_for_operator(self, devices: Devices, trial: Trial, operator: Operator) -> None:
         """Have the robot set up and held; ask again until its IMU agrees.
 
         Raises:
@@ -125,10 +181,7 @@ class HardwareTarget:
         place = f"hold it still at pitch {trial.pitch:+.3f} rad with room to both sides"
         request = f"trial {trial.name}: {carried} on the robot; {place}, press Enter and let go: "
         while True:
-            try:
-                input(request)
-            except EOFError as error:
-                raise KeyboardInterrupt from error
+            operator.set_up(request, trial, load)
             doubt = self._doubt(devices, trial)
             if doubt is None:
                 return
@@ -154,16 +207,16 @@ class HardwareTarget:
         return None
 
     @contextmanager
-    def _connected(self) -> Iterator[Devices]:
-        """The devices, opened; closed at the end."""
+    def _connected(self) -> Iterator[tuple[Devices, LoggedBus]]:
+        """The devices and their bus, opened; closed at the end."""
         motor, imu_settings = self._motor(), self._imu()
         imu = open_imu(imu_settings)
         try:
-            bus = open_bus(self.can, motor.master_id)
+            bus = LoggedBus(open_bus(self.can, motor.master_id))
             try:
                 radius = self.nominal().parameters["wheel_radius"]
                 drivetrain = Drivetrain(radius, motor.direction, motor.on_body)
-                yield Devices(CanMotor(bus, motor, self._ranges()), imu, drivetrain)
+                yield Devices(CanMotor(bus, motor, self._ranges()), imu, drivetrain), bus
             finally:
                 with suppress(*BUS_LOST):
                     bus.shutdown()
@@ -185,21 +238,30 @@ class HardwareTarget:
 
 def _tell(trial: Trial, run: TrialRun) -> None:
     """One line about a trial, and a warning where the motor may still be on."""
-    words = [f"stopped early: {run.cut_short}" if run.cut_short else "done"]
+    words = [run.end]
     if run.recording is not None:
         shown = ((name, run.recording[name]) for name in ("x", "theta", "u"))
         ranges = (f"{name} {values.min():.3g} to {values.max():.3g}" for name, values in shown)
         words.append(f"{len(run.recording)} rows in {run.recording.duration:.2f} s ({', '.join(ranges)})")
-    for count, what in (
-        (run.overruns, "steps skipped"),
-        (run.lost_replies, "replies of the motor lost (interpolated)"),
-        (run.damaged_messages, "messages of the IMU damaged"),
-    ):
-        if count:
-            words.append(f"{count} {what}")
-    print(f"trial {trial.name}: {'; '.join(words)}", file=sys.stderr)
+    print(f"trial {trial.name}: {'; '.join(words + _loop_words(run.quality))}", file=sys.stderr)
     if not run.switched_off:
         print(
             "WARNING: the motor has not confirmed that it is off; cut its power before you touch the robot",
             file=sys.stderr,
         )
+
+
+def _loop_words(quality: LoopQuality | None) -> list[str]:
+    """How well the loop kept time, and what was missed."""
+    if quality is None:
+        return []
+    words = [quality_words(quality.summary())]
+    if quality.overruns:
+        at = ", ".join(f"{overrun.t:.2f}" for overrun in quality.overruns[:SHOWN])
+        more = ", ..." if len(quality.overruns) > SHOWN else ""
+        words.append(f"{quality.skipped} steps skipped (at {at}{more} s)")
+    if quality.lost_replies:
+        words.append(f"{len(quality.lost_replies)} replies of the motor lost (interpolated)")
+    if quality.damaged_messages:
+        words.append(f"{quality.damaged_messages} messages of the IMU damaged")
+    return words

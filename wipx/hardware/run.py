@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wipx.control.loop import Loop
+from wipx.core.loop_quality import LoopQuality
 from wipx.core.recording import Recording
 from wipx.hardware.devices import Devices
 from wipx.hardware.pace import Pace, undisturbed
@@ -20,23 +21,26 @@ class TrialRun:
         recording: Until the end, or until it was cut short; None where that was at once.
         cut_short: Why it was; None where it was not.
         device_lost: Whether that was for a device, so that no trial can follow.
+        interrupted: Whether it was for Ctrl-C or another signal to stop.
         switched_off: Whether the motor has confirmed that it is off.
-        overruns: Steps of the loop that were skipped because the one before ended late.
-        lost_replies: Commands that the motor did not answer in time.
-        damaged_messages: Of the IMU.
+        quality: How well the loop kept time; None where it was cut short at once.
     """
 
     recording: Recording | None
     cut_short: str | None
     device_lost: bool
+    interrupted: bool
     switched_off: bool
-    overruns: int
-    lost_replies: int
-    damaged_messages: int
+    quality: LoopQuality | None
+
+    @property
+    def end(self) -> str:
+        """How it ended, in words."""
+        return f"stopped early: {self.cut_short}" if self.cut_short else "done"
 
 
 def run_trial(devices: Devices, trial: Trial, loop: Loop, limits: Limits, *, priority: int, source: str) -> TrialRun:
-    """Run the robot from its release to the end of the trial, or to a limit.
+    """Run the robot from its release to the end of the trial, to a limit, to a fault or to an interruption.
 
     Args:
         devices: Of the robot; the IMU has been read.
@@ -45,30 +49,23 @@ def run_trial(devices: Devices, trial: Trial, loop: Loop, limits: Limits, *, pri
         limits: Stop it.
         priority: Of the scheduler, see `undisturbed`.
         source: Origin of the recording.
-
-    Raises:
-        KeyboardInterrupt: it was interrupted; the motor has been switched off.
     """
     pace = Pace(loop.rate)
-    cut_short, device_lost, switched_off = None, False, False
-    with interruptible() as interruptions, undisturbed(priority):
-        try:
-            _drive(devices, trial, loop, limits, pace)
-        except (LimitError, DeviceError) as stop:
-            cut_short, device_lost = str(stop), isinstance(stop, DeviceError)
-        finally:
-            interruptions.hold()
-            switched_off = devices.end()
+    cut_short, device_lost, interrupted, switched_off = None, False, False, False
+    try:
+        with interruptible() as interruptions, undisturbed(priority):
+            try:
+                _drive(devices, trial, loop, limits, pace)
+            except (LimitError, DeviceError) as stop:
+                cut_short, device_lost = str(stop), isinstance(stop, DeviceError)
+            finally:
+                interruptions.hold()
+                switched_off = devices.end()
+    except KeyboardInterrupt:
+        cut_short, interrupted = cut_short or "interrupted", True
     note = f"{source}; stopped early: {cut_short}" if cut_short else source
-    return TrialRun(
-        devices.recording(trial.name, note),
-        cut_short,
-        device_lost,
-        switched_off,
-        pace.overruns,
-        devices.motor.lost,
-        devices.imu.damaged,
-    )
+    recording, quality = devices.recording(trial.name, note), devices.quality(loop.rate, pace.overruns)
+    return TrialRun(recording, cut_short, device_lost, interrupted, switched_off, quality)
 
 
 def _drive(devices: Devices, trial: Trial, loop: Loop, limits: Limits, pace: Pace) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -63,12 +63,33 @@ class Trial:
     events: tuple[LoadChange | Push, ...] = ()
 
 
+@runtime_checkable
+class KeepsLogs(Protocol):
+    """A target whose trials have more to tell than their recordings; it tells on the terminal how each trial went.
+
+    Attributes:
+        logs: Folder that takes the raw frames and the loop's quality of every trial; None for nothing.
+    """
+
+    logs: str | None
+
+
 class Target(Protocol):
     """A robot that can be run."""
 
     @property
     def loads(self) -> Mapping[str, Load]:
         """Weights that can be put on it, by name, as its owner has measured them."""
+        ...
+
+    @property
+    def emulated(self) -> bool:
+        """Whether its recordings are emulated, not of a real robot."""
+        ...
+
+    @property
+    def rail(self) -> float:
+        """How far it may go from the release, to either side [m]."""
         ...
 
     def nominal(self) -> Model:

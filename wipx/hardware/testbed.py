@@ -67,6 +67,11 @@ class EmulatedTestbed:
             raise InputError(f"target.seed is {self.seed}, expected a whole number from 0 on")
 
     @property
+    def emulated(self) -> bool:
+        """It is."""
+        return True
+
+    @property
     def loads(self) -> Mapping[str, Load]:
         """Weights that can be put on it, by name, as its owner has measured them."""
         return {name: settings_from(Load, place, f"target.weights.{name}") for name, place in self.weights.items()}

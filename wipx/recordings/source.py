@@ -3,9 +3,10 @@
 The settings are plain values, so that a YAML file of `conf/recordings` can hold them.
 """
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from wipx.recordings.held_out import FEWEST_ROWS, split_recordings
 from wipx.recordings.plausible import check_recording
 from wipx.recordings.robot_file import RobotDescription, read_robot, robot_from_mapping
 from wipx.recordings.signals import Signal, plain_signal, recorded_columns, required_columns
-from wipx.recordings.strict_yaml import finite_number
+from wipx.recordings.strict_yaml import finite_number, load_mapping
 from wipx.recordings.tables import Table, check_increasing, open_table
 
 ROBOT_FILE = "robot.yaml"
@@ -32,7 +33,7 @@ class RecordingSource:
     """A set of recordings and the robot that they show.
 
     Attributes:
-        path: Folder of the recordings.
+        path: Folder of the recordings, or several folders of one robot.
         title: Of reports; the folder's name where there is none.
         robot: Content of robot.yaml; None where the folder holds that file.
         files: Patterns of the recordings' file names.
@@ -43,7 +44,7 @@ class RecordingSource:
         origin: Where the recordings can be had; named when they are missing.
     """
 
-    path: str | None = None
+    path: str | list[str] | None = None
     title: str | None = None
     robot: dict[str, Any] | None = None
     files: list[str] = field(default_factory=lambda: list(GENERAL_PATTERNS))
@@ -55,7 +56,12 @@ class RecordingSource:
     @property
     def name(self) -> str:
         """The title, or the folder's name."""
-        return self.title or self._folder().resolve().name
+        return self.title or " and ".join(part._folder().resolve().name for part in self._parts())
+
+    @property
+    def place(self) -> str:
+        """Where the recordings are, for messages."""
+        return ", ".join(self.path) if isinstance(self.path, list) else str(self.path)
 
     def describe(self) -> RobotDescription:
         """The robot, as its owner knows it.
@@ -65,6 +71,8 @@ class RecordingSource:
         """
         if self.robot is not None:
             return robot_from_mapping(self.robot, self._where())
+        if isinstance(self.path, list):
+            return _one_robot(self._parts())
         path = self._folder() / ROBOT_FILE
         if not path.is_file():
             raise InputError(f"{path} is missing; describe the robot there: plant and parameters{self._hint()}")
@@ -91,6 +99,8 @@ class RecordingSource:
         Raises:
             InputError: the folder, a file, a column or a row is missing or at fault.
         """
+        if isinstance(self.path, list):
+            return self._joined()
         robot = self.describe()
         paths = self._paths(self.files)
         for pattern in self.spans:
@@ -110,6 +120,8 @@ class RecordingSource:
             InputError: two loads claim one recording, or the pattern of a load matches no file.
         """
         robot = self.describe()
+        if isinstance(self.path, list) and robot.loads:
+            raise InputError(f"recordings.path: {self.place}: folders with loads cannot be joined; choose one of them")
         if robot.loads:
             # Of all files, not the chosen ones: who chooses some need not correct robot.yaml.
             everything = self._paths((*self.files, *GENERAL_PATTERNS))
@@ -129,15 +141,38 @@ class RecordingSource:
         """
         return split_recordings(recordings, self.held_out)
 
+    def _parts(self) -> tuple["RecordingSource", ...]:
+        """One source for each folder."""
+        if not isinstance(self.path, list):
+            return (self,)
+        if not self.path:
+            raise InputError("recordings.path is empty; give a folder, or several as [FOLDER,FOLDER]")
+        return tuple(replace(self, path=path) for path in self.path)
+
+    def _joined(self) -> tuple[Recording, ...]:
+        """Recordings of all folders; each is named with its folder, from the one on that holds all of them."""
+        self.describe()
+        parts = self._parts()
+        folders = [str(part._folder().resolve()) for part in parts]
+        if len(set(folders)) < len(folders):
+            raise InputError(f"recordings.path: {self.place}: a folder is listed twice; list it once")
+        above = os.path.commonpath(folders)
+        return tuple(
+            replace(recording, name=Path(os.path.relpath(folder, above), recording.name).as_posix())
+            for folder, part in zip(folders, parts, strict=True)
+            for recording in part.load_all()
+        )
+
     def _where(self) -> str:
         """Where the robot is described."""
-        return str(self._folder() / ROBOT_FILE) if self.robot is None else "recordings.robot"
+        return str(Path(self.place) / ROBOT_FILE) if self.robot is None else "recordings.robot"
 
     def _hint(self) -> str:
         return f" (the recordings come from {self.origin})" if self.origin else ""
 
     def _folder(self) -> Path:
-        if self.path is None:
+        """The one folder."""
+        if not isinstance(self.path, str):
             needed = f"the folder with {ROBOT_FILE} and the recordings"
             raise InputError(f"recordings.path is needed: {needed}{self._hint()}")
         folder = Path(self.path).expanduser()
@@ -186,6 +221,32 @@ class RecordingSource:
             begin, end = span
             return float("-inf") if begin is None else begin, float("inf") if end is None else end
         return float("-inf"), float("inf")
+
+
+def _one_robot(parts: Sequence[RecordingSource]) -> RobotDescription:
+    """The description that all folders share; each reads its columns by its own signals.
+
+    Raises:
+        InputError: a folder describes another robot.
+    """
+    described = [(part.describe(), _written(Path(part.place).expanduser())) for part in parts]
+    (robot, content), *others = described
+    for part, (_, other) in zip(parts[1:], others, strict=True):
+        for key in {**content, **other}:
+            if content.get(key) != other.get(key):
+                raise InputError(
+                    f"recordings.path: {parts[0].place} and {part.place} are not of one robot: {key} differs in their "
+                    f"{ROBOT_FILE}; diagnose them apart, or make the files agree"
+                )
+    return robot
+
+
+def _written(folder: Path) -> dict[str, object]:
+    """What a folder's robot.yaml says of the robot, with the content of its model file in the place of its name."""
+    content = {key: value for key, value in load_mapping(folder / ROBOT_FILE).items() if key != "signals"}
+    if "model" in content:
+        content["model"] = (folder / str(content["model"])).read_bytes()
+    return content
 
 
 def _periods(t: np.ndarray, robot: RobotDescription) -> int:

@@ -15,7 +15,6 @@ from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.hardware.target import Target
 from wipx.hardware.testbed import EmulatedTestbed
 from wipx.learn.estimator import Recipe, Workshop
-from wipx.recordings.source import RecordingSource
 from wipx.report.numbers import significant
 from wipx.tasks.dataset import Dataset, SimulatedRobots, training_set_of
 from wipx.tasks.files.control import plain_control, write_courses
@@ -24,6 +23,7 @@ from wipx.tasks.files.results import written_together
 from wipx.tasks.files.tracked import log_run, note_run, training_data
 from wipx.tasks.shared.control_metrics import TrialJudge
 from wipx.tasks.shared.control_scenarios import SCENARIOS, Scenario, ScenarioName
+from wipx.tasks.shared.driven import driven_target
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 
@@ -97,9 +97,7 @@ class Control:
 
     def _target(self, job: Job) -> Target:
         """The robot; an emulated one with the rail, the step and the loads of the scenario."""
-        target, scenario = job.part("target"), SCENARIOS[self.scenario]
-        if isinstance(target, RecordingSource):
-            raise InputError("target: recordings cannot be driven; choose target=emulated or target=hardware")
+        target, scenario = driven_target(job, job.out), SCENARIOS[self.scenario]
         for name in self.loads:
             if name not in target.loads:
                 raise unknown_name("load", name, target.loads, "task.loads")

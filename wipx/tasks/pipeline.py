@@ -11,19 +11,17 @@ from tqdm import tqdm
 from wipx.control.lqr import Lqr
 from wipx.core.errors import InputError, check_positive, unknown_name
 from wipx.core.model import Model
-from wipx.core.recording import Recording
-from wipx.hardware.excitations import KINDS, excitation
-from wipx.hardware.target import Target, Trial
-from wipx.recordings.source import RecordingSource
+from wipx.hardware.excitations import EXCITATIONS
+from wipx.hardware.target import Target
 from wipx.tasks.files.results import write_csv, written_together
 from wipx.tasks.shared.control_scenarios import ScenarioName
+from wipx.tasks.shared.driven import driven_target, excited_trial, logged_slower
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
 from wipx.tasks.shared.stages import Chain, Stage, claim
 from wipx.tasks.shared.story import leave_story
 from wipx.tasks.shared.trials import write_robot
 
-RELEASED_AT, LEANING = (0.03, 0.06), 0.01  # [rad] pitch at the start of a release, and of the other runs
 OURS = "lqr_equilibrium"  # controller under a load, unless another one is asked for
 EVERYWHERE = ("name", "plant", "seed", "sim", "tracking")  # what every stage may be told
 FORWARDED = (*EVERYWHERE, "controller", "estimator", "target")  # what some stage may be told
@@ -84,9 +82,7 @@ class Pipeline:
 
     def _target(self, job: Job) -> Target:
         """The robot, if it can be driven and has the loads."""
-        target: Target | RecordingSource = job.part("target")
-        if isinstance(target, RecordingSource):
-            raise InputError("task=pipeline drives a robot; use task=diagnose recordings.path=... for recordings")
+        target = driven_target(job, job.out)
         for name in self.loads:
             if name not in target.loads:
                 raise unknown_name("load", name, target.loads, "task.loads")
@@ -100,19 +96,18 @@ class Pipeline:
         nominal: Model = job.part("plant").nominal(target.nominal())
         controller = Lqr()
         rng = np.random.default_rng(job.seed)
-        trials = [self._trial(k, name, nominal, rng) for k, name in enumerate(names)]
+        trials = [
+            excited_trial(name, EXCITATIONS[k % len(EXCITATIONS)], self.duration, nominal, rng)
+            for k, name in enumerate(names)
+        ]
         with written_together(job.out) as folder:
             (folder / "recordings").mkdir()
             feedback = controller.feedback(nominal), controller.rate
-            write_robot(folder / "recordings" / "robot.yaml", nominal, feedback, {})
+            write_robot(folder / "recordings" / "robot.yaml", nominal, feedback, {}, emulated=target.emulated)
             runs = target.run(trials, controller.loop(nominal), rng)
             for recording in tqdm(runs, desc="record", total=len(trials), leave=False, disable=None):
-                slow = logged_slower(recording, self.log_every)
+                slow = logged_slower(recording, self.log_every, controller.rate)
                 write_csv(folder / "recordings" / slow.name, dict(slow.columns))
-
-    def _trial(self, number: int, name: str, nominal: Model, rng: np.random.Generator) -> Trial:
-        pitch = rng.uniform(*RELEASED_AT) if number % KINDS == 0 else rng.uniform(-LEANING, LEANING)
-        return Trial(name, self.duration, pitch=pitch, reference=excitation(number, nominal.plant, rng))
 
     def _diagnosis(self, job: Job, forwarded: tuple[str, ...]) -> Stage:
         """What the nominal model lacks, from the recordings alone."""
@@ -188,18 +183,3 @@ def _of_groups(overrides: tuple[str, ...], *groups: str) -> tuple[str, ...]:
 def _group_of(override: str) -> str:
     """Group of an override such as `+controller.rate=500`, or of a part within one, `sim@target.engine=analytic`."""
     return override.lstrip("+~").partition("=")[0].rpartition("@")[2].partition(".")[0]
-
-
-def logged_slower(recording: Recording, every: int) -> Recording:
-    """Every so many rows of a recording; commands and reported forces are the mean until the next row."""
-    if every == 1:
-        return recording
-    rows = (len(recording) - 1) // every * every
-    seconds = np.diff(recording.t)[:rows].reshape(-1, every)
-    columns = {}
-    for name, values in recording.columns.items():
-        if name.startswith("u"):
-            columns[name] = (values[:rows].reshape(-1, every) * seconds).sum(axis=1) / seconds.sum(axis=1)
-        else:
-            columns[name] = values[:rows:every]
-    return Recording(recording.name, columns, recording.source, recording.periods * every)

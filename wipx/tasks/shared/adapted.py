@@ -28,7 +28,9 @@ def loaded_trials(source: RecordingSource) -> LoadedTrials:
     robot = source.describe()
     feedback = feedback_of(robot)
     if feedback is None:
-        raise InputError(f"{source.path}: the loop is closed in simulation; add the robot's `controller` to robot.yaml")
+        raise InputError(
+            f"{source.place}: the loop is closed in simulation; add the robot's `controller` to robot.yaml"
+        )
     recordings = source.load_all()
     names = tuple(_class_of(robot, r.name) for r in recordings)
     return LoadedTrials(recordings, names, source.loads(recordings), feedback)

@@ -25,6 +25,7 @@ from wipx.recordings.source import RecordingSource
 from wipx.sim.cache import simulator_digest
 from wipx.sim.simulator import StateFeedback
 from wipx.tasks.files.results import write_csv
+from wipx.tasks.shared.driven import driven_target
 from wipx.tasks.shared.job import Job
 
 FOLDER = Path("runs/trials")
@@ -58,10 +59,10 @@ def trials_of(job: Job, plan: TrialPlan) -> RecordingSource:
     Raises:
         InputError: the target cannot be run, or its recordings are at fault.
     """
-    target = job.part("target")
-    if isinstance(target, RecordingSource):
-        return target
-    folder = FOLDER / _digest(job, plan, target)
+    if isinstance(job.part("target"), RecordingSource):
+        return job.part("target")
+    folder = FOLDER / _digest(job, plan, job.part("target"))
+    target = driven_target(job, folder)
     with locked(folder / ".lock"):
         _record(job, target, plan, folder)
     return RecordingSource(path=str(folder), title=f"trials of {type(target).__name__}")
@@ -83,7 +84,7 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
     if feedback is None:
         raise InputError("controller: recordings for a model are made under a plain state feedback; use controller=lqr")
     if not (folder / "robot.yaml").is_file():
-        write_robot(folder / "robot.yaml", nominal, (feedback, controller.rate), target.loads)
+        write_robot(folder / "robot.yaml", nominal, (feedback, controller.rate), target.loads, emulated=target.emulated)
     if isinstance(target, EmulatedTestbed):
         write_model(target.hidden().model, hidden_file(folder))
     loop = controller.loop(nominal)
@@ -92,7 +93,9 @@ def _record(job: Job, target: Target, plan: TrialPlan, folder: Path) -> None:
         write_recording(folder / trial.name, recording)
 
 
-def write_robot(path: Path, nominal: Model, feedback: tuple[StateFeedback, float], loads: Mapping[str, Load]) -> None:
+def write_robot(
+    path: Path, nominal: Model, feedback: tuple[StateFeedback, float], loads: Mapping[str, Load], *, emulated: bool
+) -> None:
     """Describe a robot, its controller with its rate [Hz], and the loads of its recordings as robot.yaml."""
     gains, rate = feedback[0].gains.tolist(), feedback[1]
     robot: dict[str, Any] = {
@@ -100,6 +103,8 @@ def write_robot(path: Path, nominal: Model, feedback: tuple[StateFeedback, float
         "parameters": dict(nominal.parameters),
         "controller": {"kind": "lqr", "gains": gains[0] if len(gains) == 1 else gains, "rate": rate},
     }
+    if emulated:
+        robot["emulated"] = True
     if nominal.effects:
         robot["effects"] = {name: dict(values) for name, values in nominal.effects.items()}
     if loads:
