@@ -137,6 +137,17 @@ def test_a_saturated_signal_is_told_from_one_with_a_peak(fresh_seed: int):
     assert clipped.at_low == pytest.approx(np.mean(signal <= -0.9))
 
 
+def test_a_signal_that_rests_at_its_extremes_is_not_saturated():
+    t = np.arange(0.0, 20.0, 0.005)
+    share = np.clip(t % 4.0 / 1.5, 0.0, 1.0) - np.clip((t % 4.0 - 2.0) / 1.5, 0.0, 1.0)
+    encoder = np.round(10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5, 4)  # to and fro without jerk
+    levels = np.repeat(np.random.default_rng(0).normal(size=40), 100)  # a command in steps
+    column = MappedColumn("q", "s", "f", ColumnSource("s", "f"), "rad")
+    for signal in (encoder, levels, np.round(np.sin(3.0 * t), 2)):
+        summary = column_summary(column, signal, 0, (0.0, 0.0))
+        assert (summary.at_low, summary.at_high) == (0.0, 0.0)
+
+
 def test_the_longest_constant_stretch_counts_while_something_should_change():
     t = np.arange(100) * 0.1
     values = np.sin(t)

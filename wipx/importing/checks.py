@@ -10,7 +10,11 @@ from wipx.importing.merge import Episode
 from wipx.importing.spool import StoredStream
 
 SATURATED_SHARE = 0.005  # of the values at an end, from which on a signal may be saturated
-SATURATED_RUN = 3  # values in a row at an end
+SATURATED_STAY = 3.0  # usual stays at a value, from which on the signal dwells at an end
+SATURATED_ARRIVAL = (
+    0.25  # of the usual step: a signal that is cut off arrives at speed, one that turns or stops slows down
+)
+SATURATED_COUNTS = 4.0  # resolutions per step, below which speed is not to be told
 FEWEST_LEVELS = 20  # values that a signal has; one with fewer is no measured quantity but a state
 POINTS = 1200  # of a trace in a picture
 
@@ -121,13 +125,22 @@ def trace(t: np.ndarray, values: np.ndarray) -> Trace:
 
 
 def _share_at(values: np.ndarray, end: float) -> float:
-    """Share of the values at an end of a signal's range; 0 where that is no saturation."""
+    """Share of the values at an end of a signal's range; 0 where that is no saturation.
+
+    A signal is cut off where it dwells at an end at least twice, and arrived there at speed most of the times.
+    """
     at = values == end
     share = float(np.mean(at)) if len(values) else 0.0
     if share < SATURATED_SHARE or len(np.unique(values)) < FEWEST_LEVELS:
         return 0.0
-    runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(int))))[::2]
-    return share if float(np.median(np.repeat(runs, runs))) >= SATURATED_RUN else 0.0
+    changes = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
+    visited, stays = values[changes], np.diff(np.append(changes, len(values)))
+    steps = np.abs(np.diff(visited))
+    dwells = np.flatnonzero((visited == end) & (stays >= SATURATED_STAY * np.median(stays)))
+    arrivals = steps[dwells[dwells >= 2] - 2]  # the last step that the end has not shortened
+    speed = max(SATURATED_ARRIVAL * float(np.sqrt(np.mean(steps**2))), SATURATED_COUNTS * resolution(values))
+    fast = np.count_nonzero(arrivals >= speed)
+    return share if fast >= max(2, len(arrivals) / 2) else 0.0
 
 
 def _shown(stream: StoredStream) -> tuple[str, ...]:

@@ -18,7 +18,16 @@ from wipx.recordings.units import UNITS, factor_to_si
 COMMAND = re.compile(r"u(\d+|_.+)?$")
 REFERENCE = re.compile(r".+_ref$")
 # How DBC files and sensors write what has another name in `UNITS`.
-UNIT_ALIASES = {"Nm": "N m", "N.m": "N m", "N*m": "N m", "°": "deg", "°/s": "deg/s", "degree": "deg", "RPM": "rpm"}
+UNIT_ALIASES = {
+    "Nm": "N m",
+    "N.m": "N m",
+    "N*m": "N m",
+    "°": "deg",
+    "°/s": "deg/s",
+    "degree": "deg",
+    "RPM": "rpm",
+    "-": "1",
+}
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ KINDS = {  # title of a panel by what the names of its columns end with; the fir
     "command": lambda name: name == "u" or name.startswith(("u_", "u1", "u2")),
     "position": lambda name: True,
 }
+LABEL = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}  # legible on top of curves
 
 
 def draw_preview(preview: LogPreview, path: Path) -> None:
@@ -93,4 +94,4 @@ def _name_recordings(axes: Axes, preview: LogPreview) -> None:
     for piece in preview.recordings:
         middle = preview.offsets[piece.episode] + 0.5 * (piece.begin + piece.end)
         place = axes.get_xaxis_transform()
-        axes.text(middle, 0.98, piece.name, ha="center", va="top", fontsize=7, color=MUTED, transform=place)
+        axes.text(middle, 0.98, piece.name, ha="center", va="top", fontsize=7, transform=place, bbox=LABEL)

@@ -7,7 +7,7 @@ made by `wipx.hardware.mit_protocol`.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -88,10 +88,13 @@ class _Bus:
         self._seen: set[int] = set()
         self._decoded: set[str] = set()
         self._failed: dict[str, int] = {}
+        self._without_data = {"error frames (faults of the bus)": 0, "remote frames (requests without data)": 0}
 
     def decoded(self, frame: Any) -> Iterator[Chunk]:
         """The chunks that a frame completes."""
         if frame.is_error_frame or frame.is_remote_frame:
+            error, remote = self._without_data
+            self._without_data[error if frame.is_error_frame else remote] += 1
             return
         identifier, data = frame.arbitration_id, bytes(frame.data)
         stamp = int(nanoseconds(np.array(frame.timestamp)))
@@ -107,7 +110,10 @@ class _Bus:
         """What has not filled a chunk, and what could not be decoded."""
         yield from self.rows.rest()
         for stream, count in self._failed.items():
-            yield Loss(str(self._path), f"frames of {stream} do not have the length that the DBC says", count)
+            yield Loss(str(self._path), f"frames of {stream} do not have the form that the DBC says", count)
+        for kind, count in self._without_data.items():
+            if count:
+                yield Loss(str(self._path), kind, count)
 
     def check_match(self, what: str) -> None:
         """Refuse a description of another bus or of another device.
@@ -121,10 +127,10 @@ class _Bus:
                 f"{what} does not match {self._path}: it describes the ids {_hexadecimal(described)}, "
                 f"the log has {_hexadecimal(self._seen)}; give the description of this bus"
             )
-        for stream in self._failed.keys() - self._decoded:
+        if self._failed and not self._decoded:
             raise InputError(
-                f"{what} does not match {self._path}: no frame of {stream} has its length; "
-                "give the description of this device"
+                f"{what} does not match {self._path}: no frame of {', '.join(sorted(self._failed))} has the form that "
+                "it says (length, multiplexer); give the description of this device"
             )
 
     def _added(
@@ -132,6 +138,8 @@ class _Bus:
     ) -> Iterator[Chunk]:
         if values is None:
             self._failed[stream] = self._failed.get(stream, 0) + 1
+            kind = "frames that do not fit their description"
+            yield from self.rows.add(f"{stream} (not decoded)", (), (), receive=stamp, kind=kind)
             return
         self._decoded.add(stream)
         shown = values if self._wanted(stream) else {}
@@ -139,12 +147,12 @@ class _Bus:
         yield from self.rows.add(stream, names, numbers, receive=stamp, kind="CAN message", units=meaning.units)
 
 
-class _Meaning:
+class _Meaning(Protocol):
     units: Mapping[str, str]
 
     def decode(self, data: bytes) -> tuple[str, dict[str, float] | None] | None:
-        """Stream and numbers of a frame; no numbers where it has the wrong length; None where it is not meant."""
-        raise NotImplementedError
+        """Stream and numbers of a frame; no numbers where it has the wrong form; None where it is not meant."""
+        ...
 
 
 class _DbcMessage(_Meaning):

@@ -157,7 +157,7 @@ FAULTS: dict[str, tuple[Any, str, dict[str, Any], list[str]]] = {
         longer_dbc,
         "can_motors",
         {"format": {"dbc": "other.dbc"}, "columns": {"u": {"stream": "STATE", "field": "angle"}}},
-        ["other.dbc does not match", "no frame of STATE has its length"],
+        ["other.dbc does not match", "no frame of STATE has the form that it says"],
     ),
     "other motors": (
         other_dbc,
