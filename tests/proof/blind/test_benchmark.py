@@ -13,6 +13,7 @@ import pytest
 
 from wipx.core.errors import InputError
 from wipx.proof.blind import benchmark, diagnosing
+from wipx.proof.blind.answering import BlindAnswer
 from wipx.proof.blind.benchmark import BlindBenchmark
 from wipx.proof.blind.check import BlindCheck
 from wipx.proof.blind.diagnosing import OURS, Diagnosers, check_methods
@@ -224,3 +225,9 @@ def test_two_processes_do_not_work_on_one_run(tmp_path: Path):
     (tmp_path / "running.pid").write_text("1")
     with pytest.raises(InputError, match="another process is at work"):
         TASK.run(job(tmp_path))
+
+
+def test_no_job_of_a_sweep_answers_a_case_while_the_keys_are_on_disk(tmp_path: Path):
+    RunFolder(tmp_path).paused.touch()
+    with pytest.raises(InputError, match="the run is interrupted; start it again, which answers case0001 too"):
+        BlindAnswer(str(tmp_path), "case0001").run(job(tmp_path / "job"))

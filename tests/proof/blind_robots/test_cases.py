@@ -10,6 +10,7 @@ import pytest
 from wipx.core.plant import PLANTS
 from wipx.proof.blind_robots.cases import (
     TIERS,
+    Case,
     Choice,
     choose,
     difference_over_noise,
@@ -23,7 +24,7 @@ from wipx.proof.blind_robots.physics import Hidden, physics
 from wipx.proof.blind_robots.robots import draw_robot, linearised
 from wipx.proof.blind_robots.scenario import draw_log_settings, draw_scenario
 from wipx.proof.blind_robots.sizes import Draw, consequences, draw_details, draw_values, effect_names
-from wipx.proof.blind_robots.unmodelled_physics import draw_oddity, oddity_names
+from wipx.proof.blind_robots.unmodelled_physics import draw_unmodelled, unmodelled_names
 from wipx.proof.blind_robots.write import case_files, write_files
 from wipx.recordings.source import RecordingSource
 
@@ -40,7 +41,7 @@ def short(scenario):
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis", "double_pendulum"])
-def test_every_effect_and_every_oddity_changes_the_recordings(kind: str):
+def test_every_effect_and_every_unmodelled_physics_changes_the_recordings(kind: str):
     rng = np.random.default_rng(8)
     robot, settings = draw_robot(kind, rng), draw_log_settings(kind, rng, poor=False)
     scenario = short(draw_scenario(robot, settings, "multisine", rng))
@@ -51,8 +52,8 @@ def test_every_effect_and_every_oddity_changes_the_recordings(kind: str):
         values = draw_values(name, draw)
         hidden = Hidden({name: values}, {name: draw_details(name, values, draw)})
         changed[name] = record(robot, physics(kind, robot.parameters, hidden), scenario, settings)
-    for name in oddity_names(kind):
-        hidden = Hidden(oddity=draw_oddity(name, draw))
+    for name in unmodelled_names(kind):
+        hidden = Hidden(unmodelled=draw_unmodelled(name, draw))
         changed[name] = record(robot, physics(kind, robot.parameters, hidden), scenario, settings)
     noise = noise_of(kind, settings)
     unchanged = [
@@ -115,16 +116,21 @@ def test_effects_that_no_recording_tells_apart_are_not_hidden_together(fresh_see
         assert not any(names >= set(alike) for names in drawn)
 
 
-def test_a_sticky_spot_is_where_the_robot_comes_by(fresh_seed: int):
-    spot = "translation/sticky_spot"
-    moved = Choice("triple", "wip", ("pitch/stribeck", "geometry/com_offset", spot))
-    rng = np.random.default_rng(fresh_seed)
-    fresh = next(case for case in (realise(moved, rng) for _ in range(100)) if case is not None)
+def comes_by(case: Case) -> bool:
+    low, high = (case.hidden.effects["translation/sticky_spot"][end] for end in ("lo", "hi"))
+    return any(((low <= run.exact["x"]) & (run.exact["x"] <= high)).any() for run in case.visible)
+
+
+def test_a_sticky_spot_is_where_the_robot_comes_by():
     # The first spot that is drawn here is out of reach, but the pitch joint sticks: rounding grows to a contrast.
-    known = draw_case(np.random.default_rng(143669840931853103283218231824315999576), "triple")
-    for case in (fresh, known):
-        low, high = (case.hidden.effects[spot][end] for end in ("lo", "hi"))
-        assert any(((low <= run.exact["x"]) & (run.exact["x"] <= high)).any() for run in case.visible)
+    assert comes_by(draw_case(np.random.default_rng(143669840931853103283218231824315999576), "triple"))
+
+
+@pytest.mark.slow
+def test_a_sticky_spot_is_where_any_robot_comes_by(fresh_seed: int):
+    moved = Choice("triple", "wip", ("pitch/stribeck", "geometry/com_offset", "translation/sticky_spot"))
+    rng = np.random.default_rng(fresh_seed)
+    assert comes_by(next(case for case in (realise(moved, rng) for _ in range(100)) if case is not None))
 
 
 def test_a_wrong_parameter_is_listed_as_uncertain():

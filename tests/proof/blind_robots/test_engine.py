@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from proof.blind_robots.bare_robots import BODIES, open_loop
 
-from wipx.proof.blind_robots.physics import Hidden, Oddity
+from wipx.proof.blind_robots.physics import Hidden, UnmodelledPhysics
 
 
 def wip_energy(q: np.ndarray, v: np.ndarray, kind: str) -> np.ndarray:
@@ -41,9 +41,11 @@ def test_energy_is_conserved_without_effects(kind: str, energy):
 
 
 def test_a_mass_that_hardly_moves_on_the_body_changes_nothing():
-    stiff = Oddity("sloshing", {"aux_mass": 0.3, "aux_height": 0.3, "aux_stiffness": 3e4, "aux_damping": 60.0})
+    stiff = UnmodelledPhysics(
+        "sloshing", {"aux_mass": 0.3, "aux_height": 0.3, "aux_stiffness": 3e4, "aux_damping": 60.0}
+    )
     q, _, _ = open_loop("wip", start=(0.0, 0.3), rows=500)
-    with_mass, _, _ = open_loop("wip", Hidden(oddity=stiff), start=(0.0, 0.3), rows=500)
+    with_mass, _, _ = open_loop("wip", Hidden(unmodelled=stiff), start=(0.0, 0.3), rows=500)
     # the spring gives by weight / stiffness = 0.1 mm at most, which the falling body enlarges
     np.testing.assert_allclose(with_mass, q, atol=0.01)
 
@@ -126,7 +128,7 @@ def test_a_tilted_rail_pulls_down_and_leaves_upright_upright():
 
 def test_a_hysteresis_gives_way_by_its_level_and_holds_less():
     values = {"hysteresis": 2.0, "hysteresis_length": 0.05, "hysteresis_first": 0.3}
-    hidden = Hidden(oddity=Oddity("hysteresis", values))
+    hidden = Hidden(unmodelled=UnmodelledPhysics("hysteresis", values))
     held, _, _ = open_loop("linear_axis", hidden, command=np.full(1000, 0.5))
     assert 0.0 < held.max() < 0.05  # swings about the place where the elements hold the command
     q, v, _ = open_loop("linear_axis", hidden, command=np.full(1000, 3.0))
@@ -137,7 +139,7 @@ def test_a_hysteresis_gives_way_by_its_level_and_holds_less():
 
 def test_a_hysteresis_comes_back_as_it_was_built_up_twice_as_wide():
     values = {"hysteresis": 2.0, "hysteresis_length": 0.02, "hysteresis_first": 0.3}
-    hidden = Hidden({"translation/viscous": {"sigma": 20.0}}, oddity=Oddity("hysteresis", values))
+    hidden = Hidden({"translation/viscous": {"sigma": 20.0}}, unmodelled=UnmodelledPhysics("hysteresis", values))
     slowly = np.concatenate([np.linspace(0.0, 1.8, 4000), np.linspace(1.8, -1.8, 8000), np.linspace(-1.8, 1.8, 8000)])
     q, _, _ = open_loop("linear_axis", hidden, command=slowly, rows=20000, rate=125.0)
     virgin, back = q[:4000:40, 0], q[4000:12000:80, 0]

@@ -12,7 +12,7 @@ from wipx.proof.blind_robots.trees.choices import effects_of
 from wipx.proof.blind_robots.trees.dynamics import Body, at_poses, room
 from wipx.proof.blind_robots.trees.files import model_file, model_name, robot_file
 from wipx.proof.blind_robots.trees.logging import Run, Tuning, control_of, record
-from wipx.proof.blind_robots.trees.physics import Hidden, Oddity, body_of, real
+from wipx.proof.blind_robots.trees.physics import Hidden, UnmodelledPhysics, body_of, real
 from wipx.proof.blind_robots.trees.plans import LogSettings, draw_scenario
 from wipx.proof.blind_robots.trees.robots import GRAVITY, Robot, draw_robot
 from wipx.proof.blind_robots.trees.sizes import Draw, doing, draw_values
@@ -143,9 +143,11 @@ def test_a_free_drive_in_its_gap_hardly_differs_from_the_fitted_one(servos: Benc
 def test_what_moves_inside_changes_no_mass_while_it_rests(name: str):
     robot = draw_robot(np.random.default_rng(2), 4)
     hand = {"mass": 0.3 * robot.links[3].mass, "axis_x": 0.0, "axis_y": 0.6, "axis_z": 0.8}
-    oddity = Oddity(name, 1 if name == "flexible_link" else 3, {"stiffness": 1.0, "damping": 1.0, **hand})
+    unmodelled = UnmodelledPhysics(
+        name, 1 if name == "flexible_link" else 3, {"stiffness": 1.0, "damping": 1.0, **hand}
+    )
     plain = real(robot.links, robot.drives, GRAVITY, Hidden())
-    odd = real(robot.links, robot.drives, GRAVITY, Hidden(oddity=oddity))
+    odd = real(robot.links, robot.drives, GRAVITY, Hidden(unmodelled=unmodelled))
     assert len(odd.joints) == 5
     q = np.random.default_rng(3).normal(size=4)
     inside = np.zeros(5)

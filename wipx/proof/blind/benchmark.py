@@ -23,7 +23,8 @@ import numpy as np
 from tqdm import tqdm
 
 from wipx.core.errors import InputError, unknown_name
-from wipx.proof.blind.diagnosing import OURS, Diagnosers, check_methods, now
+from wipx.proof.blind.answering import LaunchedDiagnosers
+from wipx.proof.blind.diagnosing import Diagnosers, check_methods, now
 from wipx.proof.blind.drawing import draw_and_seal
 from wipx.proof.blind.evidence import Account
 from wipx.proof.blind.judging import Opened, judge, read_opened
@@ -112,7 +113,7 @@ class BlindBenchmark:
             held = self._resumed(folder) if folder.commitments.is_file() else self._drawn(folder)
             try:
                 folder.keys.unlink(missing_ok=True)  # before the next diagnosis starts
-                with closing(self._opened(folder, held.keys)) as cases:
+                with closing(self._opened(folder, held.keys, job.launcher)) as cases:
                     for opened in cases:
                         held.keys.pop(opened.case)
             except BaseException:
@@ -190,14 +191,18 @@ class BlindBenchmark:
         print(f"{self.cases} cases are sealed; what is hidden is fixed by {folder.commitments}")
         return Secrets(seed, self.seed is not None, {one.commitment.case: one.key for one in sealed})
 
-    def _opened(self, folder: RunFolder, keys: dict[str, str]) -> Generator[Opened, None, None]:
+    def _opened(
+        self, folder: RunFolder, keys: dict[str, str], launcher: tuple[str, ...]
+    ) -> Generator[Opened, None, None]:
         """Let every case be diagnosed and opened."""
-        diagnosers = Diagnosers(folder, self.time_limit)
-        compared = {f"case{number:04d}" for number in range(1, self._compared + 1)}
-        with _processes(1) as judging, ThreadPoolExecutor(self.workers) as watching:
+        if launcher:
+            diagnosers, at_once = LaunchedDiagnosers(folder, tuple(keys), self.time_limit, launcher), len(keys)
+        else:
+            diagnosers, at_once = Diagnosers(folder, self.time_limit), self.workers
+        with _processes(1) as judging, ThreadPoolExecutor(at_once) as watching:
 
             def finish(case: str, key: str) -> Opened:
-                diagnosers.answer(case, (OURS, *(self.baselines if case in compared else ())))
+                diagnosers.answer(case)
                 return judging.submit(judge, folder.path, case, key).result()
 
             begun = [watching.submit(finish, case, key) for case, key in keys.items()]

@@ -60,15 +60,15 @@ class Diagnosers:
         self._running: set[subprocess.Popen[str]] = set()
         self._stopped = threading.Event()
 
-    def answer(self, case: str, methods: Iterable[str]) -> None:
-        """Let the methods answer a case, one after the other, and note digests of their answers.
+    def answer(self, case: str) -> None:
+        """Let all methods answer a case, one after the other, and note digests of their answers.
 
         Raises:
             StoppedError: `stop` was called.
         """
         if self.folder.answers(case).is_file():
             return
-        answers = {method: asdict(self._answer_of(case, method)) for method in methods}
+        answers = {method: asdict(self._answer_of(case, method)) for method in methods_of(self.folder, case)}
         draft = self.folder.answers(case).with_suffix(".part")
         write_json(draft, {"schema": 1, "written": now(), "answers": answers})
         draft.replace(self.folder.answers(case))
@@ -130,11 +130,21 @@ class Diagnosers:
             process.kill()
             process.communicate()
             return f"no answer within {self.time_limit:g} s"
+        except KeyboardInterrupt:
+            process.kill()
+            raise
         finally:
             self._running.discard(process)
         if self._stopped.is_set():
             raise StoppedError
         return _failure(process.returncode, error)
+
+
+def methods_of(folder: RunFolder, case: str) -> tuple[str, ...]:
+    """The methods that answer a case, as the published settings of the run say."""
+    content = read_json(folder.commitments)
+    compared = [entry["case"] for entry in content["cases"]][: content["settings"]["baselines_cases"]]
+    return (OURS, *(content["settings"]["baselines"] if case in compared else ()))
 
 
 def check_methods(methods: Iterable[str]) -> None:

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 
 from wipx.proof.blind.diagnosing import OURS
-from wipx.proof.blind.evidence import interval
+from wipx.proof.blind.evidence import count_in_words
 from wipx.proof.blind.judging import Opened
 from wipx.proof.blind_robots.dirty_table import DirtyGroup, dirty_group, dirty_groups
 from wipx.proof.blind_robots.score import CaseScore
-from wipx.proof.blind_robots.table import Count
 from wipx.report.numbers import significant
 from wipx.report.score_page import Table
 
@@ -90,20 +89,16 @@ def dirty_row(one: CaseScore) -> str:
 def _cells(group: DirtyGroup) -> tuple[str, ...]:
     return (
         str(group.cases),
-        _count(group.named),
+        count_in_words(group.named),
         f"{group.kin.right}" if group.kin.total else "-",
         str(group.corrected),
         str(group.false_laws),
-        _count(group.accused),
+        count_in_words(group.accused),
         _number(group.error(0.5)),
         _number(group.error(0.95)),
         f"{group.seconds:.0f}",
         str(group.failures),
     )
-
-
-def _count(count: Count) -> str:
-    return "-" if count.total == 0 else f"{count.right} of {count.total}\n{interval(count)}"
 
 
 def _number(value: float | None) -> str:

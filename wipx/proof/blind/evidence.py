@@ -121,6 +121,11 @@ def robots(count: int) -> str:
     return f"{count} robot" if count == 1 else f"{count} robots"
 
 
+def count_in_words(count: Count) -> str:
+    """A rate as right of total, and its interval in a second line."""
+    return "-" if count.total == 0 else f"{count.right} of {count.total}\n{interval(count)}"
+
+
 def interval(count: Count) -> str:
     """The 95 % interval of a rate in words."""
     low, high = count.interval

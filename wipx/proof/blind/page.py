@@ -8,7 +8,7 @@ from pathlib import Path
 
 from wipx.proof.blind.diagnosing import OURS
 from wipx.proof.blind.dirty_page import dirty_row, dirty_sentence, dirty_tables
-from wipx.proof.blind.evidence import FALSE_ALARM_BAR, Account, bar, interval, notes, proof, robots
+from wipx.proof.blind.evidence import FALSE_ALARM_BAR, Account, bar, count_in_words, interval, notes, proof, robots
 from wipx.proof.blind.judging import Opened
 from wipx.proof.blind.tree_page import tree_row, tree_sentence, tree_tables
 from wipx.proof.blind_robots.folder import RunFolder
@@ -154,8 +154,8 @@ def _methods(cases: Sequence[Opened]) -> Table | None:
         rows.append(
             (
                 "wipx (this package)" if name == OURS else name.replace("_", " "),
-                "names nothing" if black_box else _count(named),
-                "-" if black_box else _count(whole.false_alarms),
+                "names nothing" if black_box else count_in_words(named),
+                "-" if black_box else count_in_words(whole.false_alarms),
                 _share(whole.removed),
                 _number(whole.over_floor),
                 f"{whole.seconds:.1f}",
@@ -176,16 +176,16 @@ def _methods(cases: Sequence[Opened]) -> Table | None:
 _Columns = tuple[tuple[str, Callable[[GroupScore], str]], ...]
 _NAMES: _Columns = (
     ("cases", lambda s: str(s.cases)),
-    ("exact set", lambda s: _count(s.exact)),
-    ("false alarms", lambda s: _count(s.false_alarms)),
-    ("verdict right", lambda s: _count(s.verdict)),
-    ("site right", lambda s: _count(s.site)),
-    ("called unexplained", lambda s: _count(s.flagged)),
-    ("silent alias", lambda s: _count(s.aliased)),
+    ("exact set", lambda s: count_in_words(s.exact)),
+    ("false alarms", lambda s: count_in_words(s.false_alarms)),
+    ("verdict right", lambda s: count_in_words(s.verdict)),
+    ("site right", lambda s: count_in_words(s.site)),
+    ("called unexplained", lambda s: count_in_words(s.flagged)),
+    ("silent alias", lambda s: count_in_words(s.aliased)),
     ("no answer", lambda s: str(s.failures)),
 )
 _NUMBERS: _Columns = (
-    ("interval covers", lambda s: _count(s.covered)),
+    ("interval covers", lambda s: count_in_words(s.covered)),
     ("parameter error", lambda s: _share(s.parameter_error)),
     ("place error", lambda s: _share(s.region_error)),
     ("time error", lambda s: _share(s.time_error)),
@@ -227,7 +227,7 @@ def _rates(groups: Sequence[GroupScore]) -> tuple[Rate, ...]:
     return tuple(
         Rate(
             one.name.replace("_", " "),
-            _count(one.exact).replace("\n", ", 95 %: "),
+            count_in_words(one.exact).replace("\n", ", 95 %: "),
             one.exact.right / one.exact.total,
             *one.exact.interval,
         )
@@ -282,16 +282,12 @@ def _parameters(scores: Sequence[CaseScore]) -> Table:
         "Relative error of the value, median over cases, and how often the 95 % interval covers the true one.",
         ("parameter", "found", "relative error", "interval covers"),
         tuple(
-            (name, str(len(group)), _share(median(one.error for one in group)), _count(covered(group)))
+            (name, str(len(group)), _share(median(one.error for one in group)), count_in_words(covered(group)))
             for name, group in groups.items()
         ),
         numbers=(1, 2),
         folded=True,
     )
-
-
-def _count(count: Count) -> str:
-    return "-" if count.total == 0 else f"{count.right} of {count.total}\n{interval(count)}"
 
 
 def _percent(count: Count) -> str:

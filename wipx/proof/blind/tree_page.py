@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 
 from wipx.proof.blind.diagnosing import OURS
-from wipx.proof.blind.evidence import interval
+from wipx.proof.blind.evidence import count_in_words
 from wipx.proof.blind.judging import Opened
 from wipx.proof.blind_robots.score import CaseScore
-from wipx.proof.blind_robots.table import Count
 from wipx.proof.blind_robots.tree_table import TreeGroup, tree_group, tree_groups
 from wipx.report.numbers import significant
 from wipx.report.score_page import Table
@@ -86,17 +85,13 @@ def tree_row(one: CaseScore) -> str:
 def _cells(group: TreeGroup) -> tuple[str, ...]:
     return (
         str(group.cases),
-        _count(group.joints),
-        _count(group.effects),
-        _count(group.sites),
+        count_in_words(group.joints),
+        count_in_words(group.effects),
+        count_in_words(group.sites),
         significant(group.false_per_100),
-        _count(group.covered),
-        _count(group.flagged),
+        count_in_words(group.covered),
+        count_in_words(group.flagged),
         "-" if group.over_floor is None else significant(group.over_floor),
         f"{group.seconds:.0f} ({group.slowest:.0f})",
         str(group.failures),
     )
-
-
-def _count(count: Count) -> str:
-    return "-" if count.total == 0 else f"{count.right} of {count.total}\n{interval(count)}"

@@ -21,7 +21,7 @@ from wipx.proof.blind_robots.scenario import (
 )
 from wipx.proof.blind_robots.sizes import Draw, consequences, draw_details, draw_values, effect_names, families
 from wipx.proof.blind_robots.trees.cases import TREE_TIERS
-from wipx.proof.blind_robots.unmodelled_physics import draw_oddity, oddity_names
+from wipx.proof.blind_robots.unmodelled_physics import draw_unmodelled, unmodelled_names
 
 TIERS = {  # share of the cases; 40 % with nothing hidden, so that 300 cases hold 120 chances of a false alarm
     "nothing": 0.40,
@@ -104,13 +104,13 @@ class Choice:
         tier: Key of `TIERS`.
         plant: Kind of plant.
         names: Hidden effects, "site/kind".
-        oddity: Physics outside the vocabulary; None without.
+        unmodelled: Physics outside the vocabulary; None without.
     """
 
     tier: str
     plant: str
     names: tuple[str, ...]
-    oddity: str | None = None
+    unmodelled: str | None = None
 
 
 def stratified(cases: int, first: int, tiers: tuple[str, ...], rng: np.random.Generator) -> tuple[str, ...]:
@@ -153,7 +153,7 @@ def choose(rng: np.random.Generator, tier: str) -> Choice:
     """Plant and effects; effects uniform over the plant's vocabulary."""
     plant = str(rng.choice(list(PLANT_SHARES), p=list(PLANT_SHARES.values())))
     if tier == "outside":
-        return Choice(tier, plant, (), str(rng.choice(oddity_names(plant))))
+        return Choice(tier, plant, (), str(rng.choice(unmodelled_names(plant))))
     either = {"wrong_parameters": int(rng.integers(1, 3)), "poor_logging": int(rng.integers(2))}
     count = {"nothing": 0, "pair": 2, "triple": 3, **either}.get(tier, 1)
     return Choice(tier, plant, _compatible(plant, count, tier, rng))
@@ -184,12 +184,12 @@ def realise(choice: Choice, rng: np.random.Generator, lengths: tuple[float, floa
     known = _known(choice, draw)
     parameters, uncertainty = _wrong(choice, robot, rng)
     hidden = _hidden(choice, draw)
-    real = Hidden({**known, **hidden.effects}, hidden.details, hidden.oddity)
+    real = Hidden({**known, **hidden.effects}, hidden.details, hidden.unmodelled)
     seen = _record(robot, parameters, real, visible, settings)
     if seen is None or not _visited(hidden, seen):
         return None
     contrast = _contrasts(robot, parameters, real, hidden, visible, seen, settings)
-    least = SHOWS["weak" if draw.weak else "outside" if hidden.oddity else "clear"]
+    least = SHOWS["weak" if draw.weak else "outside" if hidden.unmodelled else "clear"]
     if contrast is None or any(max(signals.values()) < least for signals in contrast.values()):
         return None
     unseen = _record(robot, parameters, real, later, settings)
@@ -241,7 +241,7 @@ def _known(choice: Choice, draw: Draw) -> dict[str, dict[str, float]]:
         return {}
     joint = str(draw.rng.choice(PLANTS[choice.plant].joints))
     name = f"{joint}/viscous"
-    if any(families(other) & families(name) for other in choice.names) or choice.oddity is not None:
+    if any(families(other) & families(name) for other in choice.names) or choice.unmodelled is not None:
         return {}
     return {name: draw_values(name, draw)}
 
@@ -261,8 +261,8 @@ def _wrong(choice: Choice, robot: Robot, rng: np.random.Generator) -> tuple[Mapp
 def _hidden(choice: Choice, draw: Draw) -> Hidden:
     effects = {name: draw_values(name, draw) for name in choice.names}
     details = {name: draw_details(name, values, draw) for name, values in effects.items()}
-    oddity = None if choice.oddity is None else draw_oddity(choice.oddity, draw)
-    return Hidden(effects, details, oddity)
+    unmodelled = None if choice.unmodelled is None else draw_unmodelled(choice.unmodelled, draw)
+    return Hidden(effects, details, unmodelled)
 
 
 def _visited(hidden: Hidden, runs: tuple[Run, ...]) -> bool:
@@ -285,7 +285,7 @@ def _contrasts(
     settings: LogSettings,
 ) -> dict[str, dict[str, float]] | None:
     """What each hidden effect changes in the recordings, over the noise; None where the robot falls without it."""
-    names = [*hidden.effects, *([] if hidden.oddity is None else [hidden.oddity.name])]
+    names = [*hidden.effects, *([] if hidden.unmodelled is None else [hidden.unmodelled.name])]
     found = {}
     for name in names:
         others = _record(robot, parameters, real.without(name), scenarios, settings)

@@ -6,6 +6,7 @@ sealed/CASE.seal     truth, unseen recordings and seed, encrypted; nobody withou
 answers/CASE/        one folder for each method, the files that it opened, and digests of the answers
 opened/CASE.json     key and scores, written after the digests of the answers
 keys.json            keys of the cases that are not opened yet; only while the run is interrupted
+paused               while it is interrupted, no job of a sweep answers a case
 """
 
 import json
@@ -35,6 +36,11 @@ class RunFolder:
     def keys(self) -> Path:
         """Keys of an interrupted run."""
         return self.path / "keys.json"
+
+    @property
+    def paused(self) -> Path:
+        """There while no job may begin to answer a case."""
+        return self.path / "paused"
 
     def recordings(self, case: str) -> Path:
         """Folder of a case's visible recordings."""

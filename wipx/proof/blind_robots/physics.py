@@ -67,7 +67,7 @@ RECORD = np.dtype(
 
 
 @dataclass(frozen=True)
-class Oddity:
+class UnmodelledPhysics:
     """Physics that the vocabulary lacks.
 
     Attributes:
@@ -88,21 +88,21 @@ class Hidden:
     Attributes:
         effects: Values of the effects' parameters [SI] by "site/kind"; names as the contract has them.
         details: What an effect's law leaves to the modeller, as fields of the record, by "site/kind".
-        oddity: Physics outside the vocabulary; None without.
+        unmodelled: Physics outside the vocabulary; None without.
         dirt: Fields of the record in which a robot differs from its laws, see `dirt.Dirt.fields`; by joint where they
             have an entry for each.
     """
 
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     details: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    oddity: Oddity | None = None
+    unmodelled: UnmodelledPhysics | None = None
     dirt: Mapping[str, float | Mapping[int, float]] = field(default_factory=dict)
 
     def without(self, name: str) -> "Hidden":
-        """The same robot without one effect, or without the oddity of that name."""
+        """The same robot without one effect, or without the unmodelled physics of that name."""
         effects = {key: values for key, values in self.effects.items() if key != name}
-        oddity = None if self.oddity is not None and self.oddity.name == name else self.oddity
-        return Hidden(effects, self.details, oddity, self.dirt)
+        unmodelled = None if self.unmodelled is not None and self.unmodelled.name == name else self.unmodelled
+        return Hidden(effects, self.details, unmodelled, self.dirt)
 
 
 def physics(kind: str, parameters: Mapping[str, float], hidden: Hidden) -> np.ndarray:
@@ -129,8 +129,8 @@ def physics(kind: str, parameters: Mapping[str, float], hidden: Hidden) -> np.nd
         _EFFECTS[effect](record, site, values)
         for entry, value in hidden.details.get(name, {}).items():
             record[entry][0, JOINT[site]] = value
-    if hidden.oddity is not None:
-        _set_oddity(record, hidden.oddity)
+    if hidden.unmodelled is not None:
+        _set_unmodelled(record, hidden.unmodelled)
     _set_dirt(record, hidden.dirt)
     if "actuator/ripple" in hidden.effects:
         record["ripple_wavenumber"] /= parameters.get("wheel_radius", 1.0)
@@ -257,10 +257,10 @@ _EFFECTS = {
 }
 
 
-def _set_oddity(record: np.ndarray, oddity: Oddity) -> None:
-    for name, value in oddity.values.items():
+def _set_unmodelled(record: np.ndarray, unmodelled: UnmodelledPhysics) -> None:
+    for name, value in unmodelled.values.items():
         if record.dtype[name].shape:
-            record[name][0, oddity.joint] = value
+            record[name][0, unmodelled.joint] = value
         else:
             record[name] = value
     mass, height = float(record["aux_mass"][0]), float(record["aux_height"][0])

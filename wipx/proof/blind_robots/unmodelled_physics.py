@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from math import pi
 
-from wipx.proof.blind_robots.physics import DRIVEN, JOINT, MOVING, Oddity
+from wipx.proof.blind_robots.physics import DRIVEN, JOINT, MOVING, UnmodelledPhysics
 from wipx.proof.blind_robots.robots import log_uniform
 from wipx.proof.blind_robots.sizes import Draw
 
 
-def oddity_names(kind: str) -> tuple[str, ...]:
+def unmodelled_names(kind: str) -> tuple[str, ...]:
     """What can be drawn for a plant."""
     everywhere = ("cubic_regeneration", "gain_drift", "asymmetric_friction", "hysteresis")
     return everywhere + {
@@ -20,13 +20,13 @@ def oddity_names(kind: str) -> tuple[str, ...]:
     }.get(kind, ())
 
 
-def draw_oddity(name: str, draw: Draw) -> Oddity:
-    """That oddity with random numbers."""
-    oddity = _DRAWN[name](name, draw)
-    return Oddity(name, {key: float(value) for key, value in oddity.values.items()}, oddity.joint)
+def draw_unmodelled(name: str, draw: Draw) -> UnmodelledPhysics:
+    """That physics with random numbers."""
+    unmodelled = _DRAWN[name](name, draw)
+    return UnmodelledPhysics(name, {key: float(value) for key, value in unmodelled.values.items()}, unmodelled.joint)
 
 
-def _moving_mass(name: str, draw: Draw) -> Oddity:
+def _moving_mass(name: str, draw: Draw) -> UnmodelledPhysics:
     """A mass that slides on a spring: sloshing of a liquid, or the first bending mode of a body that is not stiff."""
     p, rng = draw.robot.parameters, draw.rng
     bends = name == "flexible_body"
@@ -39,19 +39,19 @@ def _moving_mass(name: str, draw: Draw) -> Oddity:
         # its moment of inertia must stay below the body's own, from which it is taken
         highest = p["com_height"] + (0.5 * p["body_inertia"] / mass) ** 0.5
         values["aux_height"] = highest if bends else rng.uniform(0.5, 1.0) * highest
-    return Oddity(name, values)
+    return UnmodelledPhysics(name, values)
 
 
-def _cubic(name: str, draw: Draw) -> Oddity:
+def _cubic(name: str, draw: Draw) -> UnmodelledPhysics:
     """Force a v - b v^3: it feeds energy in below the speed sqrt(a/b), and takes it above."""
     joint = DRIVEN[draw.robot.kind][0]
     speed = draw.doing.speed[joint]
     feed = draw.rng.uniform(0.06, 0.2) * draw.doing.force[joint] / speed
     values = {"regeneration": feed, "regeneration_cubic": feed / (draw.rng.uniform(0.5, 1.2) * speed) ** 2}
-    return Oddity(name, values, joint)
+    return UnmodelledPhysics(name, values, joint)
 
 
-def _cogging(name: str, draw: Draw) -> Oddity:
+def _cogging(name: str, draw: Draw) -> UnmodelledPhysics:
     """Torque A sin(n theta + phase) of magnets at the pitch joint, of several periods within the motion."""
     way = 4.0 * draw.doing.spread[1]
     values = {
@@ -59,15 +59,15 @@ def _cogging(name: str, draw: Draw) -> Oddity:
         "cog_number": 2.0 * pi / way * draw.rng.uniform(1.5, 3.0),
         "cog_phase": draw.rng.uniform(-pi, pi),
     }
-    return Oddity(name, values, 1)
+    return UnmodelledPhysics(name, values, 1)
 
 
-def _drift(name: str, draw: Draw) -> Oddity:
+def _drift(name: str, draw: Draw) -> UnmodelledPhysics:
     """A gain that changes by 15 to 40 % over ten seconds, as a motor that warms up."""
-    return Oddity(name, {"gain_drift": draw.rng.choice([-1.0, 1.0]) * draw.rng.uniform(0.015, 0.04)})
+    return UnmodelledPhysics(name, {"gain_drift": draw.rng.choice([-1.0, 1.0]) * draw.rng.uniform(0.015, 0.04)})
 
 
-def _asymmetric(name: str, draw: Draw) -> Oddity:
+def _asymmetric(name: str, draw: Draw) -> UnmodelledPhysics:
     """Dry and viscous friction of one size forwards and another one backwards (Bona and Indri 2005).
 
     Dry friction alone would not do: of two levels it is Coulomb friction and a constant force, which have names.
@@ -83,10 +83,10 @@ def _asymmetric(name: str, draw: Draw) -> Oddity:
         "viscous_forward": (1.0 + uneven_damping) * damping,
         "viscous_backward": (1.0 - uneven_damping) * damping,
     }
-    return Oddity(name, values, int(joint))
+    return UnmodelledPhysics(name, values, int(joint))
 
 
-def _hysteresis(name: str, draw: Draw) -> Oddity:
+def _hysteresis(name: str, draw: Draw) -> UnmodelledPhysics:
     """Elements that slip one after the other, over ways as long as the motion, unlike bristles."""
     joint = DRIVEN[draw.robot.kind][0]
     values = {
@@ -94,10 +94,10 @@ def _hysteresis(name: str, draw: Draw) -> Oddity:
         "hysteresis_length": draw.rng.uniform(0.3, 1.0) * draw.doing.spread[joint],
         "hysteresis_first": draw.rng.uniform(0.2, 0.8),
     }
-    return Oddity(name, values, joint)
+    return UnmodelledPhysics(name, values, joint)
 
 
-def _wheel_slip(name: str, draw: Draw) -> Oddity:
+def _wheel_slip(name: str, draw: Draw) -> UnmodelledPhysics:
     """The wheel creeps on the ground, and slides where the force exceeds the traction."""
     p = draw.robot.parameters
     values = {
@@ -105,20 +105,20 @@ def _wheel_slip(name: str, draw: Draw) -> Oddity:
         "traction": draw.rng.uniform(0.6, 1.0) * draw.doing.peak,
         "creep": draw.doing.force[0] / draw.doing.speed[0] * log_uniform(draw.rng, 10.0, 40.0),
     }
-    return Oddity(name, values)
+    return UnmodelledPhysics(name, values)
 
 
-def _wavy(name: str, draw: Draw) -> Oddity:
+def _wavy(name: str, draw: Draw) -> UnmodelledPhysics:
     """Dry friction F (1 + sin(k x + phase)) along the rail."""
     values = {
         "rail_level": draw.rng.uniform(0.08, 0.25) * draw.doing.force[JOINT["translation"]],
         "rail_wavenumber": 2.0 * pi / (draw.doing.spread[0] * draw.rng.uniform(0.8, 2.0)),
         "rail_phase": draw.rng.uniform(-pi, pi),
     }
-    return Oddity(name, values)
+    return UnmodelledPhysics(name, values)
 
 
-_DRAWN: dict[str, Callable[[str, Draw], Oddity]] = {
+_DRAWN: dict[str, Callable[[str, Draw], UnmodelledPhysics]] = {
     "sloshing": _moving_mass,
     "flexible_body": _moving_mass,
     "cubic_regeneration": _cubic,

@@ -60,14 +60,16 @@ def robot_file(case: Case) -> dict[str, object]:
 def truth(case: Case) -> dict[str, Any]:
     """What is hidden, where and when it acts, and how the runs were made."""
     hidden, shown = case.hidden, len(case.visible)
-    oddity = hidden.oddity
+    unmodelled = hidden.unmodelled
     return {
         "schema": 1,
         "tier": case.tier,
         "plant": case.robot.kind,
         "effects": [{"name": name, "parameters": dict(values)} for name, values in hidden.effects.items()],
         "known": list(case.known),
-        "outside": None if oddity is None else {"name": oddity.name, "joint": oddity.joint, **oddity.values},
+        "outside": None
+        if unmodelled is None
+        else {"name": unmodelled.name, "joint": unmodelled.joint, **unmodelled.values},
         "regions": [
             {"signal": "x", "low": values["lo"], "high": values["hi"]}
             for name, values in hidden.effects.items()

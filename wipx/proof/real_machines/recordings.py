@@ -152,9 +152,9 @@ def check_there(sources: Iterable[RecordingSource]) -> None:
         InputError: it lists all missing folders, the files that are needed of each, and where they come from.
     """
     missing = [
-        f"{source.path}: {', '.join(source.files)} (from {source.origin})"
+        f"{source.place}: {', '.join(source.files)} (from {source.origin})"
         for source in sources
-        if source.path is None or not Path(source.path).expanduser().is_dir()
+        if source.path is None or not Path(source.place).expanduser().is_dir()
     ]
     if missing:
         raise InputError(f"recordings are missing; get them, or set WIPX_RECORDINGS=FOLDER: {'; '.join(missing)}")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wipx.proof.blind_robots.trees.choices import choose, draw_oddity, families, oddities_of
+from wipx.proof.blind_robots.trees.choices import choose, draw_unmodelled, families, unmodelled_of
 from wipx.proof.blind_robots.trees.links import corrected
 from wipx.proof.blind_robots.trees.logging import Run, Tuning, control_of, record
 from wipx.proof.blind_robots.trees.physics import Hidden, real
@@ -166,13 +166,13 @@ class _Laboratory:
             if seen is None:
                 return None
             contrast = {}
-            for name in (*hidden.effects, *([] if hidden.oddity is None else [hidden.oddity.name])):
+            for name in (*hidden.effects, *([] if hidden.unmodelled is None else [hidden.unmodelled.name])):
                 others = self.runs(hidden.without(name).beside(owned), scenarios)
                 if others is None:
                     return None
                 contrast[name] = self._contrast(seen, others)
             faint = [name for name in hidden.effects if max(contrast[name].values()) < SHOWS]
-            if hidden.oddity is not None and max(contrast[hidden.oddity.name].values()) < SHOWS_OUTSIDE:
+            if hidden.unmodelled is not None and max(contrast[hidden.unmodelled.name].values()) < SHOWS_OUTSIDE:
                 return None
             if not faint:
                 return seen, hidden, contrast
@@ -211,17 +211,17 @@ def _hidden(tier: str, draw: Draw, known: frozenset[str]) -> Hidden:
     names = choose(draw.robot, count.get(tier), known, rng)
     if tier == "tree_wrong_parameters":  # nothing that a wrong mass looks like
         names = tuple(name for name in names if not families(name) & {"mass", "scale", "constant"})
-    oddity = None
+    unmodelled = None
     if tier == "tree_outside":
-        oddity = draw_oddity(str(rng.choice(oddities_of(draw.robot))), draw)
-        names = tuple(name for name in names if draw.joint(name.partition("/")[0]) != oddity.joint)
+        unmodelled = draw_unmodelled(str(rng.choice(unmodelled_of(draw.robot))), draw)
+        names = tuple(name for name in names if draw.joint(name.partition("/")[0]) != unmodelled.joint)
     effects = {name: draw_values(name, draw) for name in names}
-    return Hidden(effects, {name: draw_details(name, values, draw) for name, values in effects.items()}, oddity)
+    return Hidden(effects, {name: draw_details(name, values, draw) for name, values in effects.items()}, unmodelled)
 
 
 def _known(hidden: Hidden, draw: Draw) -> dict[str, dict[str, float]]:
     """Viscous friction that the owner knows, in some cases, at a joint where no damping is hidden."""
-    if draw.rng.random() >= KNOWN_SHARE or hidden.oddity is not None:
+    if draw.rng.random() >= KNOWN_SHARE or hidden.unmodelled is not None:
         return {}
     name = f"{draw.rng.choice(draw.robot.joints)}/viscous"
     j = draw.joint(name.partition("/")[0])

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 
 from wipx.proof.blind_robots.robots import log_uniform
-from wipx.proof.blind_robots.trees.physics import Oddity
+from wipx.proof.blind_robots.trees.physics import UnmodelledPhysics
 from wipx.proof.blind_robots.trees.robots import Robot
 from wipx.proof.blind_robots.trees.sizes import Draw
 
@@ -38,7 +38,7 @@ FAMILIES = {
     "scale": ("gain", "scale", "kp"),
     "place": ("ripple", "sticky_spot"),
 }  # fmt: skip
-ODDITIES = ("cable", "flexible_link", "hysteresis", "slosh")
+UNMODELLED = ("cable", "flexible_link", "hysteresis", "slosh")
 
 
 def effects_of(robot: Robot, j: int, known: frozenset[str]) -> tuple[str, ...]:
@@ -104,15 +104,15 @@ def families(name: str) -> set[str]:
     return {group for group, kinds in FAMILIES.items() if kind in kinds} or {kind}
 
 
-def draw_oddity(name: str, draw: Draw) -> Oddity:
-    """That oddity with random numbers."""
-    j, values = _ODDITIES[name](draw)
-    return Oddity(name, j, {symbol: float(value) for symbol, value in values.items()})
+def draw_unmodelled(name: str, draw: Draw) -> UnmodelledPhysics:
+    """That physics with random numbers."""
+    j, values = _DRAWN[name](draw)
+    return UnmodelledPhysics(name, j, {symbol: float(value) for symbol, value in values.items()})
 
 
-def oddities_of(robot: Robot) -> tuple[str, ...]:
+def unmodelled_of(robot: Robot) -> tuple[str, ...]:
     """Physics outside the vocabulary that a robot can have."""
-    return ODDITIES if len(robot.links) > 1 else tuple(name for name in ODDITIES if name != "cable")
+    return UNMODELLED if len(robot.links) > 1 else tuple(name for name in UNMODELLED if name != "cable")
 
 
 def _cable(draw: Draw):
@@ -156,4 +156,4 @@ def _slosh(draw: Draw):
     return j, values | dict(zip(("axis_x", "axis_y", "axis_z"), axis, strict=True))
 
 
-_ODDITIES = {"cable": _cable, "hysteresis": _hysteresis, "flexible_link": _flexible_link, "slosh": _slosh}
+_DRAWN = {"cable": _cable, "hysteresis": _hysteresis, "flexible_link": _flexible_link, "slosh": _slosh}

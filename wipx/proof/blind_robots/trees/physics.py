@@ -42,7 +42,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Oddity:
+class UnmodelledPhysics:
     """Physics that the vocabulary lacks.
 
     Attributes:
@@ -63,19 +63,19 @@ class Hidden:
     Attributes:
         effects: Values of the effects' parameters [SI] by "site/kind"; names as contract section 6 has them.
         details: What a law leaves to the modeller, fields of the joint's record, by "site/kind".
-        oddity: Physics outside the vocabulary; None without.
+        unmodelled: Physics outside the vocabulary; None without.
     """
 
     effects: Mapping[str, Values] = field(default_factory=dict)
     details: Mapping[str, Values] = field(default_factory=dict)
-    oddity: Oddity | None = None
+    unmodelled: UnmodelledPhysics | None = None
 
     def without(self, name: str) -> "Hidden":
-        """The same robot without one effect, or without the oddity of that name."""
+        """The same robot without one effect, or without the unmodelled physics of that name."""
         effects = {key: values for key, values in self.effects.items() if key != name}
         details = {key: values for key, values in self.details.items() if key != name}
-        oddity = None if self.oddity is not None and self.oddity.name == name else self.oddity
-        return Hidden(effects, details, oddity)
+        unmodelled = None if self.unmodelled is not None and self.unmodelled.name == name else self.unmodelled
+        return Hidden(effects, details, unmodelled)
 
     def beside(self, other: Mapping[str, Values]) -> "Hidden":
         """The same with further effects."""
@@ -113,7 +113,7 @@ def real(links: tuple[Link, ...], drives: tuple[Drive, ...], gravity: np.ndarray
         links: With true masses; effects at links are not in them.
         drives: Of each joint.
         gravity: In the frame of a level base [m/s^2].
-        hidden: Effects and the oddity.
+        hidden: Effects and unmodelled physics.
     """
     records = joint_records(len(links))
     for r, link, drive in zip(records, links, drives, strict=True):
@@ -135,10 +135,10 @@ def real(links: tuple[Link, ...], drives: tuple[Drive, ...], gravity: np.ndarray
         _finish(r)
     links = changed(links, hidden.effects)
     cable, visible = np.zeros(1, CABLE), np.arange(len(links))
-    if hidden.oddity is not None:
-        from wipx.proof.blind_robots.trees.oddities import built
+    if hidden.unmodelled is not None:
+        from wipx.proof.blind_robots.trees.unmodelled_physics import built
 
-        links, records, cable, visible = built(hidden.oddity, links, records, cable)
+        links, records, cable, visible = built(hidden.unmodelled, links, records, cable)
     return Real(body_of(links, gravity), records, cable[0], visible)
 
 

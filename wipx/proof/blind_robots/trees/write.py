@@ -26,7 +26,7 @@ def _with_recordings(own: dict[str, str], runs: tuple[Run, ...]) -> dict[str, st
 def truth(case: Case) -> dict[str, Any]:
     """What is hidden, where it acts, and how the runs were made."""
     hidden, shown, robot = case.hidden, len(case.visible), case.robot
-    oddity = hidden.oddity
+    unmodelled = hidden.unmodelled
     return {
         "schema": 1,
         "tier": case.tier,
@@ -38,8 +38,8 @@ def truth(case: Case) -> dict[str, Any]:
         "effects": [{"name": name, "parameters": dict(values)} for name, values in hidden.effects.items()],
         "known": list(case.known),
         "outside": None
-        if oddity is None
-        else {"name": oddity.name, "joint": robot.joints[oddity.joint], **oddity.values},
+        if unmodelled is None
+        else {"name": unmodelled.name, "joint": robot.joints[unmodelled.joint], **unmodelled.values},
         "regions": [
             {"signal": name.partition("/")[0], "low": values["lo"], "high": values["hi"]}
             for name, values in hidden.effects.items()

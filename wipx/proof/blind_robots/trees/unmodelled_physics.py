@@ -6,32 +6,32 @@ from dataclasses import replace
 import numpy as np
 
 from wipx.proof.blind_robots.trees.links import Link, steiner
-from wipx.proof.blind_robots.trees.physics import Oddity
+from wipx.proof.blind_robots.trees.physics import UnmodelledPhysics
 from wipx.proof.blind_robots.trees.records import joint_records
 
 Built = tuple[tuple[Link, ...], np.ndarray, np.ndarray, np.ndarray]
 
 
-def built(oddity: Oddity, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
+def built(unmodelled: UnmodelledPhysics, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
     """Links, records of joints and of the cable, and numbers of the joints that the owner knows."""
-    return _BUILT[oddity.name](oddity, links, joints.copy(), cable.copy())
+    return _BUILT[unmodelled.name](unmodelled, links, joints.copy(), cable.copy())
 
 
-def _cable(oddity: Oddity, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
+def _cable(unmodelled: UnmodelledPhysics, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
     for name in cable.dtype.names or ():
-        cable[name] = oddity.values[name]
+        cable[name] = unmodelled.values[name]
     return links, joints, cable, np.arange(len(links))
 
 
-def _hysteresis(oddity: Oddity, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
-    for name, value in oddity.values.items():
-        joints[oddity.joint][name] = value
+def _hysteresis(unmodelled: UnmodelledPhysics, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
+    for name, value in unmodelled.values.items():
+        joints[unmodelled.joint][name] = value
     return links, joints, cable, np.arange(len(links))
 
 
-def _bending(oddity: Oddity, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
+def _bending(unmodelled: UnmodelledPhysics, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
     """Cut a link in its middle and join the parts by a hinge with a spring, across its length."""
-    i, values = oddity.joint, oddity.values
+    i, values = unmodelled.joint, unmodelled.values
     whole = links[i]
     direction = whole.tip / whole.length
     middle = 0.5 * whole.tip
@@ -63,9 +63,9 @@ def _moved(link: Link, i: int, middle: np.ndarray) -> tuple[int, np.ndarray]:
     return link.parent + 1, link.place - middle if link.parent == i else link.place
 
 
-def _slosh(oddity: Oddity, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
+def _slosh(unmodelled: UnmodelledPhysics, links: tuple[Link, ...], joints: np.ndarray, cable: np.ndarray) -> Built:
     """Let a part of the last link's mass slide on a spring; at rest nothing has changed."""
-    i, values = oddity.joint, oddity.values
+    i, values = unmodelled.joint, unmodelled.values
     hand = links[i]
     point = hand.com
     axis = np.array([values[f"axis_{name}"] for name in "xyz"])
@@ -86,7 +86,7 @@ def _with_spring(joints: np.ndarray, at: int, values) -> np.ndarray:
     return np.concatenate([joints[:at], extra, joints[at:]])
 
 
-_BUILT: dict[str, Callable[[Oddity, tuple[Link, ...], np.ndarray, np.ndarray], Built]] = {
+_BUILT: dict[str, Callable[[UnmodelledPhysics, tuple[Link, ...], np.ndarray, np.ndarray], Built]] = {
     "cable": _cable,
     "hysteresis": _hysteresis,
     "flexible_link": _bending,
