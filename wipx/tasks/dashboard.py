@@ -38,6 +38,7 @@ class Dashboard:
             print("Ctrl-C ends it", flush=True)
             if self.browser and addresses:
                 webbrowser.open(f"{server}/#{next(iter(addresses.values()))}")
+            signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends MLflow's server too
             try:
                 signal.pause()
             except KeyboardInterrupt:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from wipx.core.errors import InputError
 from wipx.tracking.reach import SQLITE, check_reachable
-from wipx.tracking.views import CHARTS, TABLE, TAG, VIEWS, compared_by, view_states
+from wipx.tracking.views import CHARTS, PARENT, TABLE, TAG, VIEWS, compared_by, view_states
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -88,7 +88,8 @@ def _describe(client: "MlflowClient", experiment: str, runs: list) -> None:
     values = {name: [run.data.params[name] for run in runs if name in run.data.params] for name in view.options}
     metrics = {name for run in runs for name in run.data.metrics}
     compared = compared_by(view, values)
-    for name, state in view_states(view, metrics, compared).items():
+    in_sweep = any(PARENT in run.data.tags for run in runs)
+    for name, state in view_states(view, metrics, compared, in_sweep).items():
         client.set_experiment_tag(experiment, f"{TAG}{name}", json.dumps(state))
     by = f", by {compared}" if compared else ""
     note = f"[Runs](#{_address(experiment, TABLE)}) · [charts{by}](#{_address(experiment, CHARTS)})"
@@ -97,7 +98,7 @@ def _describe(client: "MlflowClient", experiment: str, runs: list) -> None:
 
 def _address(experiment: str, view: str) -> str:
     mode = "&compareRunsMode=CHART" if view == CHARTS else ""
-    return f"/experiments/{experiment}/runs?viewStateShareKey={view}{mode}"
+    return f"/experiments/{experiment}/runs?workflowType=machine_learning&viewStateShareKey={view}{mode}"
 
 
 def _wait(server: subprocess.Popen, address: str, log: Path) -> None:

@@ -17,6 +17,7 @@ from wipx.core.locked import locked
 from wipx.tracking.inputs_and_models import log_inputs, log_models
 from wipx.tracking.reach import SQLITE, check_reachable
 from wipx.tracking.run_note import RUN, LogNote, RunNote, read_log_note, read_run_note, write_log_note
+from wipx.tracking.views import PARENT
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -109,7 +110,7 @@ class MlflowTracking:
                 return False
             tags = {**note.tags, KEY: note.key}
             if note.in_sweep:
-                tags["mlflow.parentRunId"] = self._parent(client, experiment, out.parent)
+                tags[PARENT] = self._parent(client, experiment, out.parent)
             run_id = _found(client, experiment, note.key) or _created(client, experiment, note, tags)
             _log_parameters(client, run_id, _texts(note.parameters, LONGEST_PARAMETER))
             _log_metrics(client, run_id, note)
@@ -119,7 +120,7 @@ class MlflowTracking:
             log_models(client, run_id, out, note.models)
             client.set_terminated(run_id, "FINISHED", end_time=_ms(note.ended))
             if note.in_sweep:
-                client.set_terminated(tags["mlflow.parentRunId"], "FINISHED", end_time=_ms(note.ended))
+                client.set_terminated(tags[PARENT], "FINISHED", end_time=_ms(note.ended))
             write_log_note(out, logged.with_run(self.store, run_id))
         return True
 

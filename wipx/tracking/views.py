@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 TABLE, CHARTS = "table", "charts"  # names of the shared views
 TAG = "mlflow.sharedViewState."
+PARENT = "mlflow.parentRunId"  # tag of a job: its sweep's run
 SECTION = "comparison"
 
 
@@ -92,19 +93,25 @@ def compared_by(view: View, values: Mapping[str, Collection[str]]) -> str | None
     return next((name for name in view.options if len(set(values.get(name, ()))) > 1), None)
 
 
-def view_states(view: View, metrics: Collection[str], compared: str | None) -> dict[str, dict[str, object]]:
+def view_states(
+    view: View, metrics: Collection[str], compared: str | None, in_sweep: bool = False
+) -> dict[str, dict[str, object]]:
     """States of the two shared views, by name.
 
     Args:
         view: What matters.
         metrics: Those that the runs have.
         compared: Option by whose values runs are averaged in charts; None for one bar a run.
+        in_sweep: Whether the runs are jobs of a sweep. They are sorted by the first metric, since MLflow folds them
+            away below the sweep's run where runs are sorted by time.
     """
     shown = [name for name in view.metrics if name in metrics]
     columns = [_key("params", name) for name in view.options]
     columns += [_key("tags", name) for name in view.tags]
     columns += [_key("metrics", name) for name in shown]
     everything: dict[str, object] = {"selectedColumns": ["attributes.`Duration`", "attributes.`Dataset`", *columns]}
+    if in_sweep and shown:
+        everything |= {"orderByKey": _key("metrics", shown[0]), "orderByAsc": True}
     bars = [_chart("BAR", i, {"metricKey": name, "displayName": name}) for i, name in enumerate(shown)]
     lines = [
         _chart("LINE", len(bars) + i, {"metricKey": name, "selectedMetricKeys": [name], "xAxisKey": "step"})
@@ -116,7 +123,7 @@ def view_states(view: View, metrics: Collection[str], compared: str | None) -> d
         "compareRunCharts": [*bars, *lines],
         "compareRunSections": [{**section, "isGenerated": False}],
         "groupBy": compared and {"aggregateFunction": "average", "groupByKeys": [_group(compared)]},
-        "runsHiddenMode": "SHOWALL",
+        "runsHiddenMode": "SHOW_ALL",
         "useGroupedValuesInCharts": True,
         "isAccordionReordered": False,
     }
