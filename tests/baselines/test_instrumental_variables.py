@@ -7,11 +7,11 @@ import pytest
 
 from wipx.baselines.case import Problem
 from wipx.baselines.instrumental_variables import InstrumentalVariables
-from wipx.baselines.tree_regressor import Signals, missing, regressor, weight_of
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
+from wipx.identify.inverse_dynamics import Signals, missing, regressor, weight_of
 from wipx.proof.blind_robots.trees.dynamics import at_poses, room
 from wipx.proof.blind_robots.trees.files import model_file, model_name, robot_file
 from wipx.proof.blind_robots.trees.links import changed

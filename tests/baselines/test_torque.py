@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from baselines.driven_pendulum import NOISE, VISCOUS, Effects, pendulum, record
 
-from wipx.baselines.motion import motions
 from wipx.baselines.torque import TorqueData
 from wipx.core.plant import plant_of
+from wipx.identify.motion import motions
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_a_drive_that_follows_its_command_leaves_the_delay_to_the_sensor(fresh_s
     assert "actuator/delay" not in found.equivalent
 
 
-@pytest.mark.parametrize("kind", ["wip", "linear_axis"])
+@pytest.mark.parametrize("kind", [pytest.param("wip", marks=pytest.mark.slow), "linear_axis"])
 def test_scale_and_zero_of_the_drive_are_not_trusted(kind: str, fresh_seed: int):
     plain = bench(kind, {}, fresh_seed)
     told = reporting(plain.recordings, np.random.default_rng(fresh_seed), scale=1.2)
@@ -59,7 +59,7 @@ def test_a_repeated_command_tells_nothing():
     assert Bench(plain.nominal, echo, {}).data.reported.shape[1] == 0
 
 
-@pytest.mark.parametrize("kind", ["wip", "linear_axis"])
+@pytest.mark.parametrize("kind", [pytest.param("wip", marks=pytest.mark.slow), "linear_axis"])
 def test_a_report_that_comes_late_is_no_late_drive(kind: str, fresh_seed: int):
     plain = bench(kind, {}, fresh_seed)
     late = reporting(plain.recordings, np.random.default_rng(fresh_seed), delay=0.005)  # more than a row

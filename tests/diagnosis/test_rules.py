@@ -13,7 +13,7 @@ from wipx.app import configuration_folder
 from wipx.config import build, register
 from wipx.core.errors import InputError
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
-from wipx.diagnosis.rules import USUAL, Note
+from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.rules_page import page
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,7 +46,6 @@ def test_a_diagnosis_keeps_to_the_rules_that_it_is_given(fresh_seed: int):
     case = bench("linear_axis", {"translation/coulomb": {"F_c": 1.0}}, fresh_seed)
     robot = KnownRobot(case.nominal, case.uncertainty)
     demanding = replace(USUAL, selection=replace(USUAL.selection, least_gain=1e6))
-    assert [effect.name for effect in case.diagnosed().effects] == ["translation/coulomb"]
     answer = diagnose(case.recordings, robot, SIMULATOR, rules=demanding)
     assert "translation/coulomb" not in {effect.name for effect in answer.effects}
     assert answer.verdict == "unexplained"
@@ -57,10 +56,10 @@ def test_the_page_is_up_to_date():
     assert written == page(), "write it anew: python -m wipx.diagnosis.rules_page > docs/rules.md"
 
 
-@pytest.mark.parametrize(("name", "value", "note"), list(USUAL.each()), ids=NAMES)
-def test_every_rule_says_what_it_means_and_where_it_comes_from(name: str, value: float, note: Note):
-    assert note.meaning
-    assert note.origin
-    if note.neutral is not None:
-        part, _, rule = name.partition(".")
-        assert getattr(getattr(USUAL.without(name), part), rule) == note.neutral
+def test_every_rule_says_what_it_means_and_where_it_comes_from():
+    for name, _, note in USUAL.each():
+        assert note.meaning, name
+        assert note.origin, name
+        if note.neutral is not None:
+            part, _, rule = name.partition(".")
+            assert getattr(getattr(USUAL.without(name), part), rule) == note.neutral, name

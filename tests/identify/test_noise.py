@@ -5,7 +5,7 @@ import pytest
 
 from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
-from wipx.identify.noise import quantisation, sensor_noise
+from wipx.identify.noise import low_passed, quantisation, sensor_noise
 
 T = np.arange(1000) / 250.0
 
@@ -45,3 +45,15 @@ def test_a_coarse_sensor_has_at_least_the_deviation_of_its_step(step: float):
 
 def test_a_sensor_that_never_moves_has_a_noise_above_zero():
     assert 0.0 < noise_of(np.zeros(1000)) < 1e-6
+
+
+def test_signals_that_a_filter_smoothed_are_told_from_noisy_ones(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    waves = [np.sin(2.0 * np.pi * f * T + rng.uniform(0.0, 6.3)) / f for f in (0.5, 1.1, 2.0)]
+    smooth, plant = np.sum(waves, axis=0), plant_of("pendulum")
+    noisy = smooth + 1e-3 * rng.normal(size=len(T))
+    filtered = Recording("r.csv", {"t": T, "theta": smooth, "u": 2.0 * smooth})
+    logged = Recording("r.csv", {"t": T, "theta": noisy, "u": 2.0 * smooth})
+    assert low_passed((filtered,), plant, 1e-3) == pytest.approx(2.0, abs=0.7)
+    assert low_passed((logged,), plant, 1e-3) is None
+    assert low_passed((filtered, logged), plant, 1e-3) is None

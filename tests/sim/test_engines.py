@@ -31,7 +31,6 @@ ROUND_OFF = 1e-9  # all engines have the same integrator; least masses and the o
 PAPER = {"F_s": 0.15, "F_c": 0.12, "v_s": 0.2, "sigma": 0.02, "epsilon": 0.01, "alpha": 0.7}  # the paper's figure
 PAPERS = {"translation/lagged_stribeck": PAPER, "pitch/lagged_stribeck": PAPER}
 SIZES = Scales(duration=0.2, length=0.4)  # of the effects below; every other scale is one
-EVERYWHERE = [(kind, name) for kind in PLANTS for name in vocabulary(PLANTS[kind])]
 BATCHED = {"wip": ("body_mass", "environment/rail_tilt.angle"), "double_pendulum": ("link1_com", "link2_mass")}
 
 
@@ -75,18 +74,16 @@ def test_engines_agree_over_the_papers_window(engine: SteppedSimulator, kind: st
 
 
 @EVERY
-@pytest.mark.parametrize(("kind", "name"), EVERYWHERE)
-def test_every_effect_works_in_every_engine(engine: SteppedSimulator, kind: str, name: str, fresh_seed: int):
-    t = uneven(np.random.default_rng(fresh_seed), 20)
-    model = forceful(kind, name)
-    commands = sines(t, 0.8, len(model.plant.commands))
-    ours, theirs, bare = (
-        move(m, LIVELY[kind], t, commands, sim)
-        for m, sim in ((model, ANALYTIC), (model, engine), (robot(kind), ANALYTIC))
-    )
-    np.testing.assert_allclose(theirs.q, ours.q, rtol=0.0, atol=ROUND_OFF)
-    np.testing.assert_allclose(theirs.v, ours.v, rtol=0.0, atol=100.0 * ROUND_OFF)
-    assert np.max(np.abs(ours.q - bare.q)) > 1e3 * ROUND_OFF
+@pytest.mark.parametrize("kind", PLANTS)
+def test_every_effect_works_in_every_engine(engine: SteppedSimulator, kind: str, fresh_seed: int):
+    plant, t = PLANTS[kind], uneven(np.random.default_rng(fresh_seed), 20)
+    commands = sines(t, 0.8, len(plant.commands))
+    bare = move(robot(kind), LIVELY[kind], t, commands, ANALYTIC)
+    for name in vocabulary(plant):
+        ours, theirs = (move(forceful(kind, name), LIVELY[kind], t, commands, sim) for sim in (ANALYTIC, engine))
+        np.testing.assert_allclose(theirs.q, ours.q, rtol=0.0, atol=ROUND_OFF, err_msg=name)
+        np.testing.assert_allclose(theirs.v, ours.v, rtol=0.0, atol=100.0 * ROUND_OFF, err_msg=name)
+        assert np.max(np.abs(ours.q - bare.q)) > 1e3 * ROUND_OFF, name
 
 
 @EVERY

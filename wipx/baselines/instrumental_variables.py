@@ -13,14 +13,13 @@ from typing import ClassVar
 import numpy as np
 
 from wipx.baselines.case import Answer, Found, Problem
-from wipx.baselines.motion import Motion, motions
-from wipx.baselines.torque_fit import independent_rows
-from wipx.baselines.tree_regressor import NAMED, Signals, missing, regressor, weight_of
 from wipx.core.errors import InputError, check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.effects.catalogue import effect_of
+from wipx.identify.inverse_dynamics import Signals, missing, regressor, signals_of, weight_of
+from wipx.identify.motion import Motion, independent_rows, motions
 from wipx.identify.prediction import Predictor
 from wipx.identify.windows import cut
 
@@ -31,6 +30,11 @@ CERTAIN = 4.0  # standard deviations from neutral by which an effect must differ
 LEAD = 0.1  # [s] before a simulation from which its state is estimated
 SECONDS = 0.5  # of a simulation
 MOST = 5  # effects of each joint
+NAMED = {  # kinds that are fitted, by class of site
+    "joint": ("viscous", "coulomb", "rotor_inertia"),
+    "drive": ("offset", "gain"),
+    "link": ("payload", "com_offset", "inertia"),
+}
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,7 @@ class _Data:
         plant = case.nominal.plant
         assert plant.tree is not None
         smoothed = motions(case.recordings, plant, case.noise)
-        signals = _joined([_signals(case.nominal, motion) for motion in smoothed])
+        signals = signals_of(case.nominal, smoothed)
         carried = regressor(plant.tree, signals, weight_of(case.nominal))
         size = np.std(missing(case.nominal, signals, carried), axis=0)
         return cls(case, smoothed, signals, carried, np.maximum(size, 1e-9))
@@ -220,29 +224,7 @@ class _Data:
                     columns[name][place] = np.nan_to_num(predicted[rows, j, r], nan=float(np.mean(columns[name])))
             moved.append(Recording(recording.name, {**recording.columns, **columns}, periods=recording.periods))
         again = motions(tuple(moved), case.nominal.plant, case.noise)
-        return _joined([_signals(case.nominal, motion) for motion in again])
-
-
-def _signals(model: Model, motion: Motion) -> Signals:
-    """Kept rows of a smoothed recording; forces pass the same filter as positions."""
-    plant, kept = model.plant, motion.kept
-    forces, commands = np.zeros_like(motion.coordinates), motion.commands()
-    for i, site in enumerate(plant.actuated):
-        j, drive = plant.joints.index(site), plant.drives[site]
-        if drive.kind == "position":
-            stiffness, damping = model.servo(site)
-            force = stiffness * (commands[:, i] - motion.coordinates[:, j]) - damping * motion.rates[:, j]
-            forces[:, j] = force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
-        else:
-            forces[:, j] = model.parameters[f"{site}.gain"] * commands[:, i]
-    slides = motion.filtered(np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0))
-    parts = (motion.coordinates, motion.rates, motion.accelerations, motion.filtered(forces), slides)
-    return Signals(*(part[kept] for part in parts))
-
-
-def _joined(parts: list[Signals]) -> Signals:
-    names = ("coordinates", "rates", "accelerations", "forces", "slides")
-    return Signals(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        return signals_of(case.nominal, again)
 
 
 def _with(model: Model, names: list[str], case: Problem) -> Model:

@@ -13,11 +13,11 @@ import numpy as np
 
 from wipx.baselines.candidates import Candidate, candidates
 from wipx.baselines.case import Answer, Found, Problem, excluded
-from wipx.baselines.motion import motions
 from wipx.baselines.torque import TorqueData
 from wipx.baselines.torque_fit import TorqueFit, TorqueFitter
 from wipx.core.errors import check_positive
 from wipx.effects.catalogue import effect_of
+from wipx.identify.motion import motions
 
 TRIED = 3  # effects that are refined at each step
 AS_GOOD = 0.01  # nats within which two effects explain the recordings equally well

@@ -14,11 +14,11 @@ import numpy as np
 
 from wipx.baselines.case import Answer, Problem
 from wipx.baselines.learned_simulator import learned_simulator
-from wipx.baselines.motion import Motion, motions
 from wipx.baselines.network import ResidualAcceleration
 from wipx.baselines.torque import TorqueData
 from wipx.core.errors import InputError, check_positive
 from wipx.identify.evaluation import Judge
+from wipx.identify.motion import Motion, motions
 
 EXPLAINED = 0.1  # share of the squared residual acceleration of unseen rows from which the model is called wrong
 RATE = 3e-3  # of Adam, falls to a hundredth

@@ -18,10 +18,10 @@ from scipy.integrate import cumulative_trapezoid
 
 from wipx.baselines.candidates import Candidate, candidates
 from wipx.baselines.case import Answer, Found, Problem, excluded
-from wipx.baselines.motion import motions
 from wipx.baselines.torque import TorqueData
 from wipx.baselines.torque_fit import TorqueFitter
 from wipx.core.errors import check_positive
+from wipx.identify.motion import motions
 
 SEGMENT = 3.0  # [s] into which recordings are cut, since weak integrals need stretches of equal length
 HALF_WIDTH = 0.25  # [s] of a stretch over which a term is integrated

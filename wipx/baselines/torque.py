@@ -13,9 +13,9 @@ import numba
 import numpy as np
 from scipy.signal import lfilter
 
-from wipx.baselines.motion import Motion
 from wipx.baselines.rigid_body import RigidBody
 from wipx.core.model import Model
+from wipx.identify.motion import Motion
 
 Values = Mapping[str, float]
 

@@ -10,6 +10,7 @@ from scipy.optimize import least_squares
 from wipx.baselines.case import Problem
 from wipx.baselines.torque import TorqueData
 from wipx.core.model import Model
+from wipx.identify.motion import independent_rows
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
 
 SECANT = 1e-3  # finite-difference step in the unit cube
@@ -134,15 +135,3 @@ class TorqueFitter:
             for site, _, kind in [name.partition("/")]
             if kind == "stribeck"
         }
-
-
-def independent_rows(residual: np.ndarray) -> float:
-    """Rows of white noise that tell as much as coloured ones, shape (rows, joints): N (1 - r)/(1 + r).
-
-    A filter and unknown forces both leave neighbouring rows alike; a criterion that took them for independent would
-    never find a model that is good enough.
-    """
-    centred = residual - residual.mean(axis=0)
-    alike = np.sum(centred[1:] * centred[:-1], axis=0) / np.maximum(np.sum(centred**2, axis=0), 1e-300)
-    colour = float(np.clip(np.max(alike), 0.0, 0.98))
-    return len(residual) * (1.0 - colour) / (1.0 + colour)

@@ -322,12 +322,18 @@ class NextExperiment:
         menu: All that were simulated, the best first.
         reference: Columns of the file that the controller can run: t and x_ref or theta_ref, or u; empty where
             the experiment needs none.
+        release: Coordinate of the last joint from which the robot is released [rad, or m without a pitch].
+        mass: Known mass that is added to the body [kg].
+        repeats: How often it is to be done.
     """
 
     question: str
     best: Experiment
     menu: tuple[Experiment, ...]
     reference: Mapping[str, np.ndarray]
+    release: float = 0.0
+    mass: float = 0.0
+    repeats: int = 1
 
 
 @dataclass(frozen=True)

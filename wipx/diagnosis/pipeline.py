@@ -13,6 +13,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.answer.answer import answered, proposed
 from wipx.diagnosis.answer.caveats import caveats
 from wipx.diagnosis.answer.suspects import asked, check_suspects
+from wipx.diagnosis.candidates.torque_regression import expected_effects
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
@@ -20,6 +21,7 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.rules import USUAL, Rules
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import search_of
+from wipx.diagnosis.selection.search import Chosen
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
 from wipx.sim.analytic import AnalyticSimulator
@@ -96,12 +98,13 @@ def diagnose(
     begun = time.perf_counter()
     check_long_enough(recordings)
     halves = in_two(recordings)
-    setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves))
+    expected = expected_effects(robot.nominal, halves) if robot.nominal.plant.tree is not None else {}
+    setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves), expected=expected)
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
     context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)
     fitter = context.by_row
-    nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), {}), context.first_levels))
+    nominal = fitter.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
     store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)
     if context.is_driven and setting.nominal.plant.tree is None:
@@ -109,7 +112,7 @@ def diagnose(
         check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     search = search_of(store, nominal, context.held_out)
-    chosen = search.run()
+    chosen = Chosen(nominal) if context.by_forecasts_alone else search.run()
     watcher("what is left over", 0.5)
     end = found(context, search, chosen)
     context, search, rest = end.context, end.search, end.rest
@@ -125,4 +128,6 @@ def diagnose(
         answer = replace(answer, suspects=asked(context, search, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
-    return replace(answer, title=title, source=source, notes=caveats(recordings, rules.answer), seconds=seconds)
+    return replace(
+        answer, title=title, source=source, notes=caveats(recordings, rules.answer, context.cut_off), seconds=seconds
+    )

@@ -82,7 +82,7 @@ class ForecastRules(EvidenceRules):
     level: float = rule(
         0.1,
         "probability",
-        "chance that any effect is named without cause, by Student's test on stretches of time",
+        "chance that any effect is named without cause, by Vuong's test on stretches of time",
         "judgement: one false law in ten robots is what a user can live with; test: Vuong 1989, Econometrica 57(2)",
         UNLIMITED,
     )
@@ -262,6 +262,20 @@ class TrustRules:
         "ratio of errors to the nominal model's, or to those from the best states, beyond which a model is wrong",
         "chosen on 24 exact generated robots: one at 1.51, the others below 1.4",
         UNLIMITED,
+    )
+    foretold: float = rule(
+        0.5,
+        "of the variance of innovations",
+        "share that earlier ones foretell on every joint of an arm, beyond which its laws hold only nearly",
+        "derived: a right model leaves white noise; at most 0.005 on an exact arm, at least 0.95 on a real one",
+        UNLIMITED,
+    )
+    smoothed: float = rule(
+        1e-3,
+        "of the power of second differences",
+        "share at high frequencies below which the signals of an arm were low-passed, so that single rows tell nothing",
+        "derived: white noise of a thirtieth of the smallest accelerations shows; nine tenths of its power lie there",
+        0.0,
     )
 
 

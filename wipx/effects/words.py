@@ -3,6 +3,7 @@
 Words begin in lower case (but for names such as Coulomb), so that they fit into a sentence.
 """
 
+from collections.abc import Sequence
 from types import MappingProxyType
 
 from wipx.effects.catalogue import kind_of, kinds, of_trees
@@ -58,10 +59,18 @@ def effect_in_words(name: str, plant_kind: str) -> str:
     return " and ".join(_one_effect(part.strip(), plant_kind) for part in name.split("+"))
 
 
+def kind_at(sites: Sequence[str], kind: str, plant_kind: str) -> str:
+    """A kind of effect at several sites, e.g. "viscous friction on elbow and wrist"."""
+    known = kind_of(f"{sites[0]}/{kind}") if kind in kinds() or kind in of_trees() else None
+    words = known.words if known else f"{kind.replace('_', ' ')} of {{place}}"
+    return words.format(place=in_a_row([site_in_words(site, plant_kind) for site in sites]))
+
+
+def in_a_row(words: Sequence[str]) -> str:
+    """Words as a sentence lists them, e.g. "a, b and c"."""
+    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+
+
 def _one_effect(name: str, plant_kind: str) -> str:
     site, _, kind = name.partition("/")
-    if not kind:
-        return name
-    effect = kind_of(name) if kind in kinds() or kind in of_trees() else None
-    words = effect.words if effect else f"{kind.replace('_', ' ')} of {{place}}"
-    return words.format(place=site_in_words(site, plant_kind))
+    return kind_at([site], kind, plant_kind) if kind else name

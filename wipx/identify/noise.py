@@ -19,6 +19,30 @@ def sensor_noise(recordings: tuple[Recording, ...], plant: Plant) -> np.ndarray:
     return np.array([_noise_of([r[column] for r in recordings]) for column in plant.coordinates])
 
 
+def low_passed(recordings: tuple[Recording, ...], plant: Plant, share: float) -> float | None:
+    """Frequency above which no signal has any power to speak of [Hz]; None where one has noise of its own.
+
+    Second differences of white noise have nine tenths of their power in the upper half of the band of frequencies;
+    those of signals that a filter has smoothed have hardly any there.
+
+    Args:
+        recordings: Of one robot.
+        plant: Says which columns are coordinates and commands.
+        share: Of that power in the upper half, below which a signal counts as smoothed.
+    """
+    highest = 0.0
+    for column in (*plant.coordinates, *plant.commands):
+        for recording in recordings:
+            bent = np.diff(recording[column], 2)
+            power = np.abs(np.fft.rfft((bent - bent.mean()) * np.hanning(len(bent)))) ** 2
+            below = np.cumsum(power) / max(float(power.sum()), 1e-300)
+            if power.sum() > 0.0 and 1.0 - below[len(below) // 2] > share:
+                return None
+            top = int(np.searchsorted(below, 1.0 - share)) / max(len(below) - 1, 1)
+            highest = max(highest, 0.5 * top * recording.rate if power.sum() > 0.0 else 0.0)
+    return highest or None
+
+
 def quantisation(series: list[np.ndarray]) -> float:
     """Smallest step between different values, if the sensor shows one; else 0."""
     values = np.unique(np.concatenate(series))

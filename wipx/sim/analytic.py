@@ -6,9 +6,10 @@ that are Python objects drive the same code row by row (`drive`).
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from wipx.sim.kernel import rollout
 from wipx.sim.layout import ClosedLoop, Layout
 from wipx.sim.rows import TOGETHER
 from wipx.sim.simulator import Path, Rollouts, StateFeedback
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 LEAST_WORK_PER_THREAD = 75_000  # lane steps, about 1 ms: less is not worth a thread
 
@@ -66,6 +70,16 @@ class AnalyticSimulator:
 
     def __post_init__(self) -> None:
         check_positive(step=self.step)
+
+    @property
+    def cores(self) -> int:
+        """How many threads may run side by side."""
+        return self.threads or os.cpu_count() or 1
+
+    def side_by_side(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """What some work, most of which is simulation, makes of each item, several at the same time."""
+        with ThreadPoolExecutor(self.cores) as pool:
+            return list(pool.map(work, items))
 
     def smoothed(self, speeds: tuple[float, ...]) -> "AnalyticSimulator":
         """The same engine with dry friction that builds up over these `speeds` of the joints [m/s, rad/s]."""
@@ -259,7 +273,7 @@ class _Run:
 
     def _shares(self, first_row: int, last_row: int) -> list[int]:
         """Lane bounds of the threads, in whole vectors."""
-        threads = self.simulator.threads or os.cpu_count() or 1
+        threads = self.simulator.cores
         steps = self.layout.lanes * int(self.substeps[first_row:last_row].max(axis=1, initial=0).sum())
         lanes = self.layout.lanes
         vectors = -(-lanes // TOGETHER)

@@ -38,3 +38,9 @@ def test_uneven_steps_are_told(fresh_seed: int):
 def test_a_single_recording_is_no_second_opinion():
     (said,) = caveats((even("swing.csv"),))
     assert "one recording only, swing.csv" in said
+
+
+def test_low_passed_signals_are_told_with_what_they_hide():
+    (said,) = caveats((even("r1.csv"), even("r2.csv")), cut_off=3.04)
+    assert "above 3 Hz" in said
+    assert "backlash" in said

@@ -80,11 +80,13 @@ def example(folder: Path) -> tuple[Model, Recordings]:
 @pytest.mark.parametrize("name", MISSING)
 def test_missing_physics_is_no_mistake(name: str, fresh_seed: int):
     model = nominal_model("wip")
-    recordings = Robot(model.with_effects(MISSING[name])).record(np.random.default_rng(fresh_seed), 2)
+    recordings = Robot(model.with_effects(MISSING[name])).record(np.random.default_rng(fresh_seed), 1)
     checked(model, recordings, tuple(MISSING[name]))
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name", [n if n in ("nothing_missing", "pendulum") else pytest.param(n, marks=pytest.mark.slow) for n in EXAMPLES]
+)
 def test_examples_are_plausible(name: str, examples: Path):
     checked(*example(examples / name), EXAMPLES[name])
 
@@ -92,7 +94,7 @@ def test_examples_are_plausible(name: str, examples: Path):
 @pytest.mark.parametrize("undone", SLIPS_OF["wip"])
 def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
     model = nominal_model("wip")
-    recordings = Robot(model.with_effects(MISSING["gain"])).record(np.random.default_rng(fresh_seed), 2)
+    recordings = Robot(model.with_effects(MISSING["gain"])).record(np.random.default_rng(fresh_seed), 1)
     mistake = next(mistake for mistake in mistakes(model, RULES) if mistake.undone == undone)
     with pytest.raises(
         InputError, match=f"^robot.yaml: the recordings contradict its {mistake.contradicted} .*{undone}"
@@ -103,7 +105,7 @@ def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
 @pytest.mark.parametrize("undone", SLIPS_OF["pendulum"])
 def test_mistakes_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: int):
     model = nominal_model("pendulum")
-    recordings = Robot(model.with_effects({"pitch/coulomb": {"F_c": 0.2}})).record(np.random.default_rng(fresh_seed))
+    recordings = Robot(model.with_effects({"pitch/coulomb": {"F_c": 0.2}})).record(np.random.default_rng(fresh_seed), 1)
     mistake = next(mistake for mistake in mistakes(model, RULES) if mistake.undone == undone)
     with pytest.raises(InputError, match=f"with {undone}"):
         checked(*with_slip(mistake, model, recordings), ("pitch/viscous",))
@@ -113,13 +115,13 @@ def test_mistakes_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: in
 @pytest.mark.parametrize("kind", ["wip", "pendulum"])
 def test_numbers_in_a_wrong_unit_are_named(kind: str, mistake: Mistake, fresh_seed: int):
     model = nominal_model(kind)
-    recordings = Robot(model).record(np.random.default_rng(fresh_seed), 2)
+    recordings = Robot(model).record(np.random.default_rng(fresh_seed), 1)
     (name,) = mistake.parameters
     with pytest.raises(InputError, match=f"write {name}: {model.parameters[name]:.5g} if it is in"):
         checked(*with_slip(mistake, model, recordings))
 
 
-@pytest.mark.parametrize("name", ["two_effects", "pendulum"])
+@pytest.mark.parametrize("name", [pytest.param("two_effects", marks=pytest.mark.slow), "pendulum"])
 def test_a_reversed_command_of_an_example_is_named(name: str, examples: Path):
     model, recordings = example(examples / name)
     mistake = mistakes(model, RULES)[0]

@@ -38,7 +38,7 @@ from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_effects, simple_law
 from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import effect_of
-from wipx.effects.words import effect_in_words
+from wipx.effects.words import effect_in_words, in_a_row
 from wipx.report.diagnosis_sentence import sentence
 from wipx.sim.simulator import StateFeedback
 
@@ -57,11 +57,12 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
     ends = estimates(context.fitter, fit, search.nominal)
     effects = _effects(context, search, fit, repeated, ends, shapes)
-    wrong = not context.is_quiet(fit) or context.is_worse(fit)
+    unruly = context.unruly_joints(fit)
+    wrong = not context.is_quiet(fit) or context.is_worse(fit) or bool(unruly)
     left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
     matters = left and fitted.times_the_floor > rules.trust.near_floor
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
-    unexplained = replace(_unexplained(context, rest), significant=left)
+    unexplained = replace(_unexplained(context, rest, unruly), significant=left)
     parts = search.split(fit)
     laws = [combined(context.beside(part), part, own) for part, own in parts] if not rest.significant else []
     as_one = tuple(law for of_part in laws for law in of_part)
@@ -123,10 +124,13 @@ def _effects(
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> tuple[FoundEffect, ...]:
-    found = []
-    for part, own in search.split(fit):
+    def told(piece: tuple[Search, Fit]) -> list[FoundEffect]:
+        part, own = piece
         again = repeated if own is fit else transfer(part.store.fitter, own)
-        found += _effects_of_part(context.beside(part), part, own, again, ends, shapes)
+        return _effects_of_part(context.beside(part), part, own, again, ends, shapes)
+
+    parts = context.fitter.simulator.side_by_side(told, search.split(fit))
+    found = [effect for part in parts for effect in part]
     total = sum(effect.log_evidence_gain for effect in found) or 1.0
     shared = [replace(effect, share=effect.log_evidence_gain / total) for effect in found]
     return tuple(sorted(shared, key=lambda effect: -effect.log_evidence_gain))
@@ -218,12 +222,15 @@ def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool
     return simple_law(name) == effect or (replaced is not None and effect in replaced)
 
 
-def _unexplained(context: Context, rest: Rest) -> Unexplained:
+def _unexplained(context: Context, rest: Rest, unruly: tuple[str, ...]) -> Unexplained:
     laws = {name: effect_of(name, context.data.plant) for name in rest.fit.effects}
     outside_vocabulary = [name for name, law in laws.items() if not context.fitter.looks_for(name, law)]
     if rest.significant and outside_vocabulary:
         words = " and ".join(effect_in_words(name, context.data.plant.kind) for name in outside_vocabulary)
         return Unexplained(True, rest.p_value, outside_vocabulary[0].partition("/")[0], words, rest.resembles, None)
+    if unruly and (not rest.significant or rest.strongest is None):
+        words = f"predictions of {in_a_row(unruly)} err far more than noise makes them"
+        return Unexplained(True, rest.p_value, unruly[0], words, rest.resembles, None)
     if not rest.significant or rest.strongest is None:
         return Unexplained(False, rest.p_value, None, "", (), None)
     shape = rest.strongest.shape

@@ -6,13 +6,26 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.rules import USUAL, AnswerRules
 
 
-def caveats(recordings: tuple[Recording, ...], rules: AnswerRules = USUAL.answer) -> tuple[str, ...]:
-    """One sentence for each: a single recording, missing rows, uneven time steps."""
+def caveats(
+    recordings: tuple[Recording, ...], rules: AnswerRules = USUAL.answer, cut_off: float | None = None
+) -> tuple[str, ...]:
+    """One sentence for each: a single recording, low-passed signals, missing rows, uneven time steps.
+
+    Args:
+        recordings: Of one robot.
+        rules: What is said.
+        cut_off: Frequency above which no signal has any power [Hz]; None where they have.
+    """
     said = []
     if len(recordings) == 1:
         said.append(
             f"There is one recording only, {recordings[0].name}: what differs from run to run cannot show, "
             "and what is held out is a part of the same run."
+        )
+    if cut_off is not None:
+        said.append(
+            f"All signals were low-passed before they were logged: they have hardly any power above {cut_off:.2g} Hz. "
+            "Gravity, friction and gains show; noise, delays, sticking and backlash do not."
         )
     missing = {one.name: _missing(one, rules.gap) for one in recordings}
     missing = {name: rows for name, rows in missing.items() if rows}

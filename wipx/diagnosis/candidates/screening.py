@@ -149,8 +149,8 @@ def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
     """Whether the observer asks the joint of an effect for no force to speak of, beside those of the fit's laws."""
     plant = setting.nominal.plant
     joint = plant.joint_at(name.partition("/")[0])
-    level = fitter.sketched_by_row(fit)[1].levels.force[plant.joints.index(joint)]
-    return bool(level <= fitter.rules.trust.quiet * setting.scales[joint].force)
+    by_row, seen = fitter.sketched_by_row(fit)
+    return not by_row.asks_for_force(seen.levels, setting.scales)[plant.joints.index(joint)]
 
 
 def _scanned(scan: Scan, fitter: Fitter, fit: Fit, name: str) -> np.ndarray:

@@ -73,7 +73,9 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
 def confirmed_by_part(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
     """Each part of a robot without its effects that are not confirmed (`confirmed`)."""
     parts = search.split(fit)
-    found = [confirmed(context.beside(part), part, own, small=small) for part, own in parts]
+    found = context.fitter.simulator.side_by_side(
+        lambda piece: confirmed(context.beside(piece[0]), *piece, small=small), parts
+    )
     considered = tuple(each for chosen in found for each in chosen.considered)
     if all(chosen.fit is own for chosen, (_, own) in zip(found, parts, strict=True)):
         return Chosen(fit, considered)

@@ -1,6 +1,7 @@
 """What all stages of a diagnosis share: the recordings, what fits models to them, and what judges predictions."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import Rules
 from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import RIGHT, Judge
-from wipx.identify.noise import sensor_noise
+from wipx.identify.noise import low_passed, sensor_noise
 from wipx.sim.analytic import AnalyticSimulator
 
 TREE_STEP = 2.0  # times the simulator's usual step, in which robots of many joints are followed
@@ -81,7 +82,7 @@ class Context:
         if self.is_worse(fit):
             return False
         if self.data.plant.tree is not None:  # a slow filter loses the fast motion of an arm, however right its model
-            return True
+            return not self.unruly_joints(fit)
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
@@ -89,9 +90,26 @@ class Context:
 
     def is_quiet(self, fit: Fit) -> bool:
         """Whether a fit asks for no forces but those of its laws, row by row."""
-        levels = self.fitter.seen_by_row(fit)[1].levels
-        usual = np.array([self.setting.scales[site].force for site in self.data.plant.joints])
-        return bool(np.all(levels.force <= self.rules.trust.quiet * usual))
+        by_row, seen = self.fitter.seen_by_row(fit)
+        return not by_row.asks_for_force(seen.levels, self.setting.scales).any()
+
+    def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
+        """Joints of an arm whose laws hold nearly at best, and whose predictions err far more than noise makes them.
+
+        The worst is first. Noise is that of the sensors and that of the forces which the observer asks for: white
+        forces of spectral density q on a body of mass matrix M move it by M^-1 q sqrt(t^3 / 3) in a time t.
+        """
+        plant = self.data.plant
+        if plant.tree is None:
+            return ()
+        by_row, seen = self.fitter.seen_by_row(fit)
+        shaken = by_row.innovations_model.linear.b * seen.levels.force  # (places, joints, joints)
+        moved = np.sqrt(np.mean(np.sum(shaken**2, axis=2), axis=0) * HORIZON**3 / 3.0)
+        errors = self.errors(fit)
+        noise = np.hypot([errors.noise_floor[name] for name in plant.coordinates], moved)
+        times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
+        wrong = (times > self.rules.trust.far_off) & (by_row.foretold(seen) > self.rules.trust.foretold)
+        return tuple(plant.joints[j] for j in np.argsort(-times) if wrong[j])
 
     def is_worse(self, fit: Fit) -> bool:
         """Whether a fit predicts the recordings far worse than the nominal model, though it was fitted to them."""
@@ -118,6 +136,16 @@ class Context:
     def is_driven(self) -> bool:
         """Whether any command ever changes."""
         return bool(np.ptp(self.data.inputs.commands, axis=0).max() > 0.0)
+
+    @cached_property
+    def cut_off(self) -> float | None:
+        """Frequency above which no signal has any power [Hz]; None where they have: then single rows tell something."""
+        return low_passed(self.recordings, self.data.plant, self.rules.trust.smoothed)
+
+    @property
+    def by_forecasts_alone(self) -> bool:
+        """Whether forecasts decide, whatever innovations say: those of an arm's low-passed signals say nothing."""
+        return self.data.plant.tree is not None and self.cut_off is not None
 
     @property
     def held_out(self) -> HeldOut:

@@ -47,11 +47,11 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
         search: The search by innovations.
         chosen: What it chose.
     """
-    context = context.trusting(chosen.fit)
     doubted = context.setting.doubted(context.rules.forecasts.undeclared)
     fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, doubted)
-    if context.data.plant.tree is not None and fitter.is_possible and not context.is_quiet(chosen.fit):
+    if context.data.plant.tree is not None and fitter.is_possible and not _holds(context, chosen.fit):
         return _by_forecasts(context, fitter, chosen.fit)[0]  # laws of an arm hold nearly at best: that decides alone
+    context = context.trusting(chosen.fit)
     rest, shapes = decided(context, search, chosen)
     by_row = Found(context, search, rest, shapes)
     if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
@@ -65,6 +65,11 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
     exact = bool(rest.fit.effects) and context.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
     return by_row if agrees or exact else ahead
+
+
+def _holds(context: Context, fit: Fit) -> bool:
+    """Whether the laws of an arm hold row by row on some joint at least, and ask for hardly any forces but theirs."""
+    return not context.by_forecasts_alone and context.is_quiet(fit) and not context.by_row.holds_nowhere(fit)
 
 
 def _predicts_better(one: Found, other: Found) -> bool:

@@ -104,11 +104,13 @@ class Fitter(ABC):
         considered: Effects that are fitted in each step of a search, at most.
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
+        sweeps: Searches of each part of a robot of many joints, at most.
     """
 
     considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
+    sweeps: ClassVar[int]
 
     @property
     @abstractmethod
@@ -199,6 +201,10 @@ class Fitter(ABC):
     @abstractmethod
     def refined(self) -> Self:
         """The same with half the step of the simulator."""
+
+    @abstractmethod
+    def first_fit(self, hypothesis: Hypothesis, levels: Any) -> Fit:
+        """The fit of a hypothesis that is far from what has been fitted so far."""
 
     @abstractmethod
     def without(self, *recordings: int) -> Self:

@@ -17,7 +17,7 @@ from itertools import product
 from typing import ClassVar
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import ndtri
 
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
@@ -98,6 +98,7 @@ class ForecastFitter(Fitter):
     considered = 12
     steps = 3
     close_call = 20.0
+    sweeps = 1  # where no law holds, a second one finds what stands in for others
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
     by_row: InnovationFitter
@@ -199,8 +200,8 @@ class ForecastFitter(Fitter):
         """The same, with doubt of the part's own numbers."""
         return replace(self, doubted=setting.doubted(self.rules.forecasts.undeclared), _doubts={}, _seen={})
 
-    def first_fit(self, hypothesis: Hypothesis) -> Fit:
-        """A first fit of a hypothesis, from starts of its own."""
+    def first_fit(self, hypothesis: Hypothesis, levels: PredictionStarts | None = None) -> Fit:
+        """From starts of its own."""
         return self.converged(self.fit(hypothesis, self.prediction_starts(hypothesis.model)))
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
@@ -210,15 +211,22 @@ class ForecastFitter(Fitter):
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Whether stretches of time agree that the larger one predicts recordings better that it was not fitted to.
 
-        Student's test on the differences of their likelihoods (Vuong 1989, Econometrica 57(2)), at a level for all
-        effects that are looked at together. In long recordings it must also matter, not only be certain.
+        Vuong's test on the differences of their likelihoods (1989, Econometrica 57(2)), at a level for all effects that
+        are looked at together; effects that recorded forces ask for were not picked from so many. In long recordings it
+        must also matter, not only be certain.
         """
         kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
         count, rules = len(kept), self.rules.forecasts
-        looked_at = sum(self.looks_for(name, e) for name, e in vocabulary(self.data.plant).items())
-        reach = -float(stdtrit(count - 1, min(rules.level / looked_at, 0.5)))
+        added = set(larger.effects) - set(smaller.effects)
+        looked_at = 1 if all(map(self.doubted.expects, added)) else self._looked_at
+        reach = -float(ndtri(min(rules.level / looked_at, 0.5)))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
         return float(kept.sum()) >= max(self.rules.selection.least_gain, chance, rules.matters * self.rows)
+
+    @cached_property
+    def _looked_at(self) -> int:
+        """How many effects are looked for."""
+        return sum(self.looks_for(name, effect) for name, effect in vocabulary(self.data.plant).items())
 
     def _by_stretch(self, values: np.ndarray) -> np.ndarray:
         """Sums of what predictions have (N,), over each stretch of time in which any counts."""

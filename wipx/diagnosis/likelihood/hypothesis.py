@@ -1,7 +1,7 @@
 """A hypothesis: the nominal model, the effects that are supposed to be missing, and what may vary."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,12 +22,18 @@ class Setting:
         uncertainty: Relative standard deviation of nominal numbers that are not exact.
         scales: Characteristic sizes by site.
         sites: Where effects are looked for; None for everywhere.
+        expected: Numbers, by "site/kind.symbol" [SI], of effects that recorded forces ask for.
     """
 
     nominal: Model
     uncertainty: Mapping[str, float]
     scales: Mapping[str, Scales]
     sites: frozenset[str] | None = None
+    expected: Mapping[str, float] = field(default_factory=dict)
+
+    def expects(self, effect: str) -> bool:
+        """Whether recorded forces ask for an effect "site/kind"."""
+        return any(name.rpartition(".")[0] == effect for name in self.expected)
 
     def looks_at(self, effect: str) -> bool:
         """Whether an effect "site/kind" is looked for."""

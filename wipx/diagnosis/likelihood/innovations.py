@@ -3,7 +3,7 @@
 Levenberg-Marquardt steps with observer and noise model held fixed, in turn with a search over the noise levels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from wipx.core.effect import Effect
 from wipx.core.model import Model, ModelBatch
+from wipx.core.parameters import Scales
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import CONVERGED, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
@@ -42,6 +43,7 @@ class InnovationFitter(Fitter):
     considered = 6
     steps = 5
     close_call = 60.0
+    sweeps = 4
 
     innovations_model: InnovationsModel
     rules: Rules = USUAL
@@ -113,6 +115,31 @@ class InnovationFitter(Fitter):
         """As if one number more made the difference: a likelihood ratio."""
         return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
 
+    def asks_for_force(self, levels: NoiseLevels, scales: Mapping[str, Scales]) -> np.ndarray:
+        """On which joints the observer asks for forces beside those of all laws, shape (joints,).
+
+        Args:
+            levels: Noise of a fit.
+            scales: Characteristic sizes by site.
+        """
+        usual = np.array([scales[site].force for site in self.data.plant.joints])
+        return levels.force > self.rules.trust.quiet * usual
+
+    def foretold(self, fit: Fit) -> np.ndarray:
+        """Share of the variance of each coordinate's innovations that earlier ones foretell, shape (joints,).
+
+        What a right model leaves is white (Kailath 1968, IEEE Trans. Automatic Control 13(6)): hardly any.
+        """
+        model, channels = fit.hypothesis.model, np.flatnonzero(self.data.channels < self.data.joints)
+        errors = self.errors_of(ModelBatch(model), fit.levels, model)[0][:, channels]  # (R, joints, K + 1)
+        rows = self.data.counted.T[:, None]
+        left = 1.0 / np.diag(fit.noise.whitening)[channels] ** 2
+        return 1.0 - left * rows.sum() / np.maximum(np.sum(errors**2 * rows, axis=(0, 2)), 1e-300)
+
+    def holds_nowhere(self, fit: Fit) -> bool:
+        """Whether the laws of a fit leave every joint of a robot an error that lasts: at best they hold nearly."""
+        return bool(np.all(self.foretold(fit) > self.rules.trust.foretold))
+
     def escape_levels(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
         return replace(fit.levels, force=LOUDER * fit.levels.force)
@@ -148,6 +175,10 @@ class InnovationFitter(Fitter):
     def whitened(self, errors: np.ndarray, noise: NoiseModel) -> np.ndarray:
         """White innovations, shape (P, R, m, K + 1)."""
         return whitened(errors, noise, self.data)
+
+    def first_fit(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
+        """From noise levels of another fit on."""
+        return self.converged(self.fit(hypothesis, self.spread_for(hypothesis.model, levels)))
 
     def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""

@@ -52,14 +52,17 @@ class InnovationsModel:
         taus = [model.effects.get(f"sensor_{name}/delay", {}).get("tau", 0.0) for name in model.plant.coordinates]
         delays = tuple(round(tau / DELAY_GRID) * DELAY_GRID for tau in taus)
         keys = [(np.concatenate([level.force, level.sensor]).tobytes(), delays) for level in levels]
-        missing = {key: level for key, level in zip(keys, levels, strict=True) if key not in self._known}
+        known = {key: self._known.get(key) for key in keys}
+        missing = {key: level for key, level in zip(keys, levels, strict=True) if known[key] is None}
         if missing:
+            fresh = dict(
+                zip(missing, observer_gains(self.linear, self.data, list(missing.values()), delays), strict=True)
+            )
             if len(self._known) > MOST_KNOWN:
                 self._known.clear()
-                return self.gains_of(levels, model)
-            found = observer_gains(self.linear, self.data, list(missing.values()), delays)
-            self._known.update(zip(missing, found, strict=True))
-        return tuple(self._known[key] for key in keys)
+            self._known.update(fresh)  # other threads may have cleared it meanwhile
+            known |= fresh
+        return tuple(gains for gains in (known[key] for key in keys) if gains is not None)
 
     def innovations(
         self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray

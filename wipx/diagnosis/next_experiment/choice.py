@@ -91,14 +91,23 @@ def next_experiment(
     if not settled.any():
         return None
     worst = table[:, settled].min(axis=1)
+    repeats = [_repeats(float(separation), rules) if question.rivals else 1 for separation in worst]
     experiments = [
-        _experiment(trial, float(separation), rules, rivals=bool(question.rivals))
-        for trial, separation in zip(trials, worst, strict=True)
+        _experiment(trial, float(separation), often)
+        for trial, separation, often in zip(trials, worst, repeats, strict=True)
     ]
     order = np.argsort(-worst, kind="stable")
     best = int(order[0])
-    menu = tuple(experiments[i] for i in order)
-    return NextExperiment(question.sentence, experiments[best], menu, trials[best].reference)
+    menu, chosen = tuple(experiments[i] for i in order), trials[best]
+    return NextExperiment(
+        question.sentence,
+        experiments[best],
+        menu,
+        chosen.reference,
+        release=chosen.release,
+        mass=chosen.mass,
+        repeats=repeats[best],
+    )
 
 
 @dataclass(frozen=True)
@@ -239,12 +248,17 @@ def _trials(
     return bench.trials(rng, masses=not asked.has_payload_event)
 
 
-def _experiment(trial: SimulatedRun, separation: float, rules: Rules, *, rivals: bool) -> Experiment:
+def _experiment(trial: SimulatedRun, separation: float, repeats: int) -> Experiment:
     sentence = trial.how
-    repeats = int(np.ceil((rules.answer.told_apart / max(separation, 1e-6)) ** 2)) if rivals else 1
-    if 1 < repeats <= rules.experiment.most_repeats:
+    if repeats > 1:
         sentence += f"; do it {repeats} times"
     return Experiment(trial.name, sentence, separation)
+
+
+def _repeats(separation: float, rules: Rules) -> int:
+    """How often an experiment must be done to tell rivals apart; once where no number that is bearable would do."""
+    repeats = int(np.ceil((rules.answer.told_apart / max(separation, 1e-6)) ** 2))
+    return repeats if repeats <= rules.experiment.most_repeats else 1
 
 
 def _value_and_slope(hypothesis: Hypothesis, index: int) -> tuple[float, float]:

@@ -41,6 +41,7 @@ class SimulatedRun:
         recording: As logged.
         reference: Columns of the file that the robot follows, time first; none where its reference stays at zero.
         mass: Known mass that is added to the body [kg].
+        release: Coordinate of the last joint from which the robot is released [rad, or m without a pitch].
     """
 
     name: str
@@ -48,6 +49,7 @@ class SimulatedRun:
     recording: Recording
     reference: Mapping[str, np.ndarray]
     mass: float = 0.0
+    release: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class Bench:
                 closed = self.feedback is not None
                 sentence = how(aimed, self.model, command, closed=closed)
                 reference = prescribed(self.model.plant, aimed, closed=closed)
-                return SimulatedRun(aimed.name, sentence, recording, reference, aimed.mass)
+                return SimulatedRun(aimed.name, sentence, recording, reference, aimed.mass, aimed.tilt)
             if not aimed.shrinks:
                 break
             aimed = replace(aimed, size=0.5 * aimed.size, tilt=0.5 * aimed.tilt)

@@ -32,23 +32,32 @@ def process_mean(slopes: np.ndarray, white: np.ndarray, knots: np.ndarray) -> tu
     normal, score = slopes.T @ slopes, slopes.T @ white
     plain = np.linalg.pinv(normal, rcond=1e-10, hermitian=True)
     size = float(np.sqrt(np.mean((plain @ score) ** 2))) + 1e-12
+    triangle = _triangle(slopes)  # products of large slopes would round what the prior adds away
     distance = (knots[:, None] - knots[None, :]) / (knots[-1] - knots[0])
 
-    def prior(logarithms: np.ndarray) -> np.ndarray:
+    def posterior_root(logarithms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Root of the prior's covariance, and that of what the white innovations add to its inverse (both lower)."""
         deviation, reach = np.exp(logarithms)
-        return deviation**2 * (np.exp(-0.5 * (distance / reach) ** 2) + NUGGET * np.eye(len(knots)))
+        prior = np.exp(-0.5 * (distance / reach) ** 2) + NUGGET * np.eye(len(knots))
+        root = deviation * np.linalg.cholesky(prior)
+        return root, _triangle(np.concatenate([np.eye(len(knots)), triangle @ root])).T
 
     def negative_evidence(logarithms: np.ndarray) -> float:
-        inner = np.eye(len(knots)) + normal @ prior(logarithms)
-        sign, determinant = np.linalg.slogdet(inner)
-        gain = 0.5 * score @ prior(logarithms) @ np.linalg.solve(inner, score)
-        return float(0.5 * determinant - gain) if sign > 0 else np.inf
+        root, inner = posterior_root(logarithms)
+        gain = 0.5 * float(np.sum(np.linalg.solve(inner, root.T @ score) ** 2))
+        return float(np.log(np.abs(np.diag(inner))).sum() - gain)
 
     start = np.log([size, 0.3])
     bounds = [(start[0] - 4.0, start[0] + 4.0), (np.log(0.08), np.log(3.0))]
     best = minimize(negative_evidence, start, method="Nelder-Mead", bounds=bounds, options={"maxiter": 120}).x
-    covariance = prior(best) @ np.linalg.inv(np.eye(len(knots)) + normal @ prior(best))
-    return -covariance @ score, np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    root, inner = posterior_root(best)
+    half = np.linalg.solve(inner, root.T)
+    return -half.T @ (half @ score), np.sqrt(np.sum(half**2, axis=0))
+
+
+def _triangle(matrix: np.ndarray) -> np.ndarray:
+    """The triangular factor R of a matrix Q R."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, residual: Residual) -> tuple[Fit, np.ndarray]:

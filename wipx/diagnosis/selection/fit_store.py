@@ -56,6 +56,11 @@ class FitStore:
         rules = self.fitter.rules.selection
         return rules.expected_share * (max(rules.least_gain, required) + 0.5 * float(np.log(fit.rows)))
 
+    def is_promising(self, fit: Fit) -> bool:
+        """Whether another effect may gain a good part of what it must."""
+        least = self.least_expected(self.nominal)
+        return any(each.gain > least for each in self.candidates_for(fit))
+
     def keep(self, fit: Fit) -> Fit:
         """Keep a fit as the best of its effects, and return it."""
         self._fits[frozenset(fit.effects)] = fit
@@ -152,7 +157,7 @@ class FitStore:
         rules = self.fitter.own_rules
         least = max(rules.promising * best, rules.worthless)
         if self.is_of_part:
-            least = max(least, self.least_expected(fit))
+            least = max(least, self.least_expected(fit), self.fitter.rules.selection.expected_share * best)
         most = min(self.fitter.considered, CONSIDERED_IN_PART) if self.is_of_part else self.fitter.considered
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][:most]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]

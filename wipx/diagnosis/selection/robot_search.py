@@ -3,11 +3,12 @@
 On an arm every joint has friction. Effects of different joints hardly compete: what one joint lacks, the observer takes
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
-whose effects act on several joints at once, are one more part. A part is searched again when another one has changed.
-At last all numbers are fitted together, and what the effects of other parts make superfluous is dropped.
+whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
+for (`torque_regression`). When parts have changed, all numbers are fitted together, and effects that those of other
+parts make superfluous are dropped; parts that may have more to find are searched again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,8 +22,7 @@ from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Chosen, ConsideredEffect, History, Search
 
-SWEEPS = 4  # searches of a part, at most
-TRIED = 3  # weakest effects of all, without which the robot is fitted
+TRIED = 3  # weakest effects of the whole robot, without which it is fitted
 
 
 def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
@@ -82,6 +82,31 @@ def _site(effect: str) -> str:
 
 
 @dataclass(frozen=True)
+class SearchedPart:
+    """A part of a robot after its search.
+
+    Attributes:
+        sites: The part.
+        begun: The fit where the search began.
+        chosen: What it chose.
+    """
+
+    sites: frozenset[str]
+    begun: Fit
+    chosen: Chosen
+
+    @property
+    def has_changed(self) -> bool:
+        """Whether its effects are others than before."""
+        return set(self.chosen.fit.effects) != set(self.begun.effects)
+
+
+def _side_by_side(parts: Sequence[frozenset[str]]) -> list[Sequence[frozenset[str]]]:
+    """Parts in groups that are searched at the same time: the first two, links and the loudest joint, are alone."""
+    return [group for group in (parts[:1], parts[1:2], parts[2:]) if group]
+
+
+@dataclass(frozen=True)
 class PartSearch(Search):
     """The search for the missing effects of one part."""
 
@@ -112,35 +137,53 @@ class RobotSearch(Search):
 
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
-        whole, considered = begin or self.nominal, History()
+        whole: Fit = begin or self._begun()
+        considered: History = ()
         waiting = self._order(whole)
-        for _ in range(SWEEPS):
+        for sweep in range(self.store.fitter.sweeps):
             held, changed = Held.of(whole), []
-            for sites in waiting:
-                search, begun = self._beside(held, sites)
-                found = search.run(begun)
-                held, considered = held.with_part(sites, found.fit), considered + found.considered
-                if set(found.fit.effects) != set(begun.effects):
-                    changed.append(sites)
+            for parts in _side_by_side(waiting):
+                searched = self._searched(held, parts, again=sweep > 0)
+                considered += tuple(each for part in searched for each in part.chosen.considered)
+                new = [part for part in searched if part.has_changed]
+                for part in new:
+                    held = held.with_part(part.sites, part.chosen.fit)
+                if new:
                     held = Held.of(self._together(held))
-                if self._is_left_loud(found.fit, sites):
-                    waiting = ()
-                    break
-            if not changed:
-                break
+                changed += [part.sites for part in new]
             kept = self.pruned(self.store.fitted(held.effects, whole))
             whole, considered = kept.fit, considered + kept.considered
-            waiting = self._again(whole, changed) if waiting else ()
+            if not changed:
+                break
+            waiting = tuple(part for part in self._order(whole) if [part] != changed)
         return Chosen(whole, considered)
 
-    def _again(self, whole: Fit, changed: list[frozenset[str]]) -> tuple[frozenset[str], ...]:
-        """Parts that are searched again: those with effects beside a part that changed later, and promising ones."""
-        least = self.store.least_expected(self.nominal)
-        promising = {_site(each.effect) for each in self.store.candidates_for(whole) if each.gain > least}
-        found = {_site(effect) for effect in whole.effects}
-        parts = self._order(whole)
-        alone = changed[0] if len(changed) == 1 else None
-        return tuple(part for part in parts if promising & part or (found & part and part != alone))
+    def _searched(self, held: Held, parts: Sequence[frozenset[str]], *, again: bool) -> list[SearchedPart]:
+        """What the searches of some parts choose, each beside what is held of the others.
+
+        Args:
+            held: What the robot has.
+            parts: That are searched side by side.
+            again: Whether they were searched before others changed; only those that may gain something now are, then.
+        """
+
+        def searched(sites: frozenset[str]) -> SearchedPart:
+            store, begun = self._beside(held, sites)
+            if again and not store.is_promising(begun):
+                return SearchedPart(sites, begun, Chosen(begun))
+            return SearchedPart(sites, begun, self._search_in(store, begun).run(begun))
+
+        return self.store.fitter.simulator.side_by_side(searched, parts)
+
+    def _begun(self) -> Fit:
+        """The fit of the effects that recorded forces ask for; the nominal model's where these do not gain enough."""
+        fitter, expected = self.store.fitter, self.store.setting.expected
+        effects = tuple(dict.fromkeys(name.rpartition(".")[0] for name in expected))
+        if not effects:
+            return self.nominal
+        hypothesis = Hypothesis.of(self.store.setting, effects, {**self.nominal.hypothesis.values, **expected})
+        fit = self.store.restarted(self.store.keep(fitter.first_fit(hypothesis, self.nominal.levels)))
+        return fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
 
     def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
         """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
@@ -150,26 +193,12 @@ class RobotSearch(Search):
         usual = np.array([scales[site].force for site in self.plant.joints])
         return (rest, *(joints[j] for j in np.argsort(-by_row.force / usual)))
 
-    def _is_left_loud(self, fit: Fit, sites: frozenset[str]) -> bool:
-        """Whether innovations ask a joint for forces beside those of its laws, once these have been searched.
-
-        Its laws hold only nearly then. Forecasts will decide, and further searches by innovations are lost.
-        """
-        joints = [j for j, joint in enumerate(self.plant.joints) if joint in sites]
-        if not joints or self.store.fitter.sketched_by_row(fit)[0] is not self.store.fitter:
-            return False
-        usual = self.store.setting.scales[self.plant.joints[joints[0]]].force
-        return bool(fit.levels.force[joints[0]] > self.store.fitter.rules.trust.quiet * usual)
-
     def exchanged(self, fit: Fit) -> Chosen:
         """Every part searched again, from the effects of a fit on."""
         return self.run(fit)
 
     def pruned(self, fit: Fit) -> Chosen:
-        """Without the effects that those of other parts make superfluous.
-
-        The weakest are tried first, as long as one of the last few was superfluous.
-        """
+        """Without the effects that those of other parts make superfluous, looked for among the weakest ones."""
         weakest = sorted(fit.effects, key=lambda effect: expected_loss(fit, effect)) if len(fit.effects) > 1 else ()
         for effect in weakest[:TRIED]:
             smaller = self.store.without(fit, effect)
@@ -181,7 +210,7 @@ class RobotSearch(Search):
     def split(self, fit: Fit) -> tuple[tuple[Search, Fit], ...]:
         """The searches of the parts that have effects, and the fit as each of them sees it."""
         parts = [sites for sites in parts_of(self.plant) if any(_site(effect) in sites for effect in fit.effects)]
-        return tuple(self._part(fit, sites) for sites in parts)
+        return tuple(self.store.fitter.simulator.side_by_side(lambda sites: self._part(fit, sites), parts))
 
     def joined(self, fit: Fit, parts: tuple[Fit, ...]) -> Fit:
         """The fit of a robot, with the effects that its parts have now."""
@@ -200,11 +229,12 @@ class RobotSearch(Search):
         """The search of a part beside a fit, and the fit as it sees it."""
         key = (id(fit), sites)
         if key not in self._known:
-            self._known[key] = (fit, *self._beside(Held.of(fit), sites))
+            store, own = self._beside(Held.of(fit), sites)
+            self._known[key] = (fit, self._search_in(store, own), own)
         return self._known[key][1:]
 
-    def _beside(self, held: Held, sites: frozenset[str]) -> tuple[Search, Fit]:
-        """The search of a part beside what the robot has elsewhere, and the fit where it begins."""
+    def _beside(self, held: Held, sites: frozenset[str]) -> tuple[FitStore, Fit]:
+        """Fits of a part beside what the robot has elsewhere, and the one where its search begins."""
         whole = self.store.setting
         own = tuple(effect for effect in held.effects if _site(effect) in sites)
         given: dict[str, dict[str, float]] = {name: dict(values) for name, values in held.extra.items()}
@@ -216,10 +246,13 @@ class RobotSearch(Search):
         fitter = self.store.fitter.beside(setting)
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
         store = FitStore.of(fitter, setting, nominal)
-        if not own:
-            return PartSearch.of(store, nominal, self.held_out), nominal
-        fit = store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels))
-        return PartSearch(store, Criteria(fitter, nominal), None, self.held_out), fit
+        return store, store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels)) if own else nominal
+
+    def _search_in(self, store: FitStore, begun: Fit) -> Search:
+        """The search of a part that begins at a fit."""
+        if not begun.effects:
+            return PartSearch.of(store, store.nominal, self.held_out)
+        return PartSearch(store, Criteria(store.fitter, store.nominal), None, self.held_out)
 
 
 def search_of(store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> Search:

@@ -4,12 +4,14 @@ Forces are those of the drives that the motion needs; laws of friction and drive
 the literature fits: viscous and Coulomb friction, constant offsets, reflected inertia of the rotors, gains.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.core.tree import Tree
+from wipx.identify.motion import Motion
 from wipx.sim.tree import equations as E
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
@@ -31,6 +33,33 @@ class Signals:
     accelerations: np.ndarray
     forces: np.ndarray
     slides: np.ndarray
+
+
+def signals_of(model: Model, motions: Sequence[Motion]) -> Signals:
+    """Kept rows of smoothed recordings; forces pass the same filter as positions.
+
+    Args:
+        model: Whose drives act; only gains of torque drives, stiffness, damping and limits of position drives count.
+        motions: Smoothed recordings.
+    """
+    parts = [_signals(model, motion) for motion in motions]
+    return Signals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def _signals(model: Model, motion: Motion) -> tuple[np.ndarray, ...]:
+    plant = model.plant
+    forces, commands = np.zeros_like(motion.coordinates), motion.commands()
+    for i, site in enumerate(plant.actuated):
+        j, drive = plant.joints.index(site), plant.drives[site]
+        if drive.kind == "position":
+            stiffness, damping = model.servo(site)
+            force = stiffness * (commands[:, i] - motion.coordinates[:, j]) - damping * motion.rates[:, j]
+            forces[:, j] = force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
+        else:
+            forces[:, j] = model.parameters[f"{site}.gain"] * commands[:, i]
+    slides = motion.filtered(np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0))
+    parts = (motion.coordinates, motion.rates, motion.accelerations, motion.filtered(forces), slides)
+    return tuple(part[motion.kept] for part in parts)
 
 
 def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
@@ -73,7 +102,8 @@ def missing(model: Model, signals: Signals, carried: np.ndarray) -> np.ndarray:
     """Forces that the motion needs and the model does not give, shape (rows, joints) [N m or N].
 
     Args:
-        model: Laws of `NAMED` and links; other effects are not seen.
+        model: Its links with their effects; of its joints and drives viscous and Coulomb friction, rotor inertias,
+            gains and offsets. Other effects are not seen.
         signals: Motion and forces.
         carried: Of `regressor`.
     """
@@ -99,10 +129,3 @@ def weight_of(model: Model) -> np.ndarray:
     """Gravity in the frame of the base, shape (3,) [m/s^2]."""
     assert model.plant.tree is not None
     return gravity(ModelBatch(model), model.plant.tree)[:, 0]
-
-
-NAMED = {  # kinds that are fitted, by class of site
-    "joint": ("viscous", "coulomb", "rotor_inertia"),
-    "drive": ("offset", "gain"),
-    "link": ("payload", "com_offset", "inertia"),
-}

@@ -133,3 +133,15 @@ def _leak(width: float, order: int) -> float:
     impulse = np.zeros(2 * int(REACH * width) + 3)
     impulse[len(impulse) // 2] = 1.0
     return float(np.linalg.norm(smooth(impulse, width, order)))
+
+
+def independent_rows(residual: np.ndarray) -> float:
+    """Rows of white noise that tell as much as coloured ones, shape (rows, joints): N (1 - r)/(1 + r).
+
+    A filter and unknown forces both leave neighbouring rows alike; a criterion that took them for independent would
+    never find a model that is good enough.
+    """
+    centred = residual - residual.mean(axis=0)
+    alike = np.sum(centred[1:] * centred[:-1], axis=0) / np.maximum(np.sum(centred**2, axis=0), 1e-300)
+    colour = float(np.clip(np.max(alike), 0.0, 0.98))
+    return len(residual) * (1.0 - colour) / (1.0 + colour)
