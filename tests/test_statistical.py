@@ -45,12 +45,11 @@ def test_without_a_seed_a_claim_is_drawn_once(tmp_path: Path):
     assert "2 passed" in run(tmp_path, 0.0).stdout
 
 
-@pytest.mark.parametrize("processes", [(), ("-n", "2")])
-def test_a_claim_that_fails_seldom_passes_and_one_that_fails_often_fails(tmp_path: Path, processes: tuple[str, ...]):
-    seldom = run(tmp_path, 0.1, "--seed=5", *processes)
+def test_a_claim_that_fails_seldom_passes_and_one_that_fails_often_fails(tmp_path: Path):
+    seldom = run(tmp_path, 0.1, "--seed=5")
     assert seldom.returncode == 0, seldom.stdout
     assert f"of {DRAWS} draws failed, as its claim allows (0.05)" in seldom.stdout
-    often = run(tmp_path, 0.9, "--seed=5", *processes)
+    often = run(tmp_path, 0.9, "--seed=5", "-n", "1")  # draws in a process, counts in another
     assert often.returncode == 1
     assert "draws failed, MORE THAN ITS CLAIM ALLOWS (0.05)" in often.stdout
     assert "python -m pytest 'test_claim.py::test_claim[draw0-seldom]' --seed=5" in often.stdout

@@ -23,7 +23,7 @@ ADDED = {
     "location": set(),
     "fit": set(),
     "unexplained": {"shape", "resembles"},
-    "identifiability": set(),
+    "identifiability": {"experiment"},
 }
 
 

@@ -1,7 +1,10 @@
 """The terminal shows the answer in a few lines."""
 
+from dataclasses import replace
+
 from report import synthetic_diagnosis
 
+from wipx.report.diagnosis_sentence import sentence
 from wipx.report.diagnosis_summary import summary
 from wipx.report.diagnosis_words import nats, percent, probability
 
@@ -21,6 +24,16 @@ def test_summary_of_a_mismatch_holds_effects_ties_errors_and_the_next_experiment
         "note: Time steps of r2.csv",
     ):
         assert part in text
+
+
+def test_effects_of_one_kind_stand_together_in_the_answer():
+    whole = synthetic_diagnosis.mismatch()
+    first = next(effect for effect in whole.effects if effect.name == "translation/coulomb")
+    second = replace(first, name="pitch/coulomb")
+    others = tuple(effect for effect in whole.effects if effect is not first)
+    told = sentence(replace(whole, effects=(first, *others, second)))
+    assert told.startswith("Coulomb friction on the rail joint and the pitch joint (F_c = 3.1 and 3.1 N)")
+    assert told.count("Coulomb") == 1
 
 
 def test_summary_answers_what_was_asked():

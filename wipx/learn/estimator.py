@@ -93,7 +93,7 @@ class Estimator(Protocol):
         """The pitch at which each robot would balance.
 
         Args:
-            windows: x and theta, shape (N, length, 2) [m, rad].
+            windows: x, from the release, and theta, shape (N, length, 2) [m, rad].
 
         Raises:
             InputError: windows of another length, or with values that are not finite.

@@ -140,14 +140,7 @@ class LeastSquaresEstimator:
         return self.fall.viewing.period
 
     def estimate(self, windows: np.ndarray) -> PitchEstimate:
-        """The pitch at which each robot would balance.
-
-        Args:
-            windows: x, from the release, and theta, shape (N, length, 2) [m, rad].
-
-        Raises:
-            InputError: windows of another length, or with values that are not finite.
-        """
+        """See `Estimator.estimate`."""
         pitch = self.fitted(windows)[:, PITCH]
         return PitchEstimate(pitch, pitch - self.half_width, pitch + self.half_width)
 

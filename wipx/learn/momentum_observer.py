@@ -211,14 +211,7 @@ class ObserverEstimator:
         return self.filter.viewing.period
 
     def estimate(self, windows: np.ndarray) -> PitchEstimate:
-        """The pitch at which each robot would balance.
-
-        Args:
-            windows: x, from the release, and theta, shape (N, length, 2) [m, rad].
-
-        Raises:
-            InputError: windows of another length, or with values that are not finite.
-        """
+        """See `Estimator.estimate`."""
         check_windows(windows, self.length, self.period)
         pitch = self.line.at(self.filter.balance(windows.astype(float)))
         return PitchEstimate(pitch, pitch - self.half_width, pitch + self.half_width)

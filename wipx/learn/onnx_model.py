@@ -77,14 +77,7 @@ class NetworkEstimator:
         return self.card.period
 
     def estimate(self, windows: np.ndarray) -> PitchEstimate:
-        """The pitch at which each robot would balance.
-
-        Args:
-            windows: x, from the release, and theta, shape (N, length, 2) [m, rad].
-
-        Raises:
-            InputError: windows of another length, or with values that are not finite.
-        """
+        """See `Estimator.estimate`."""
         check_windows(windows, self.length, self.period)
         (pitch,) = self.session.run(None, {"windows": windows.astype(np.float32)})
         pitch = np.asarray(pitch, dtype=float)

@@ -2,7 +2,17 @@
 
 from collections.abc import Mapping
 
-from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect, Location, Remainder, Suspect, SuspectedSize, Unexplained
+from wipx.core.diagnosis import (
+    Bound,
+    Diagnosis,
+    FoundEffect,
+    Location,
+    NextExperiment,
+    Remainder,
+    Suspect,
+    SuspectedSize,
+    Unexplained,
+)
 from wipx.core.results import Estimate, FitErrors
 from wipx.report.diagnosis_words import next_step, symbol_of
 
@@ -39,7 +49,11 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
             for one in diagnosis.combined
         ],
         "suspects": [_suspect(suspect) for suspect in diagnosis.suspects],
-        "identifiability": {"weak": list(diagnosis.weak), "next_experiment": next_step(diagnosis.next_experiment)},
+        "identifiability": {
+            "weak": list(diagnosis.weak),
+            "next_experiment": next_step(diagnosis.next_experiment),
+            "experiment": _next_experiment(diagnosis.next_experiment),
+        },
         "notes": list(diagnosis.notes),
         "seconds": float(diagnosis.seconds),
     }
@@ -61,6 +75,18 @@ def _effect(effect: FoundEffect) -> dict[str, object]:
             {"name": rival.name, "separation": float(rival.separation), "parameters": _floats(rival.parameters)}
             for rival in effect.rivals
         ],
+    }
+
+
+def _next_experiment(following: NextExperiment | None) -> dict[str, object] | None:
+    if following is None:
+        return None
+    return {
+        "name": following.best.name,
+        "reference": list(following.reference),
+        "release": float(following.release),
+        "mass": float(following.mass),
+        "repeats": following.repeats,
     }
 
 

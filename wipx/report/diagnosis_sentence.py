@@ -1,8 +1,10 @@
 """The answer of a diagnosis in words."""
 
+from collections.abc import Sequence
+
 from wipx.core.diagnosis import Diagnosis, FoundEffect
 from wipx.core.results import FitErrors
-from wipx.effects.words import effect_in_words
+from wipx.effects.words import in_a_row, kind_at
 from wipx.report.diagnosis_words import percent
 from wipx.report.numbers import compact
 
@@ -12,9 +14,9 @@ NEARLY = 1.3  # times the noise floor, errors up to which are told as being at i
 def sentence(diagnosis: Diagnosis) -> str:
     """The answer in one sentence or two: what was left out, how much of the mismatch is gone, and how much stays."""
     kind = diagnosis.nominal.plant.kind
-    parts = [_with_size(effect, kind) for effect in diagnosis.effects]
-    listed = parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + f" and {parts[-1]}" if parts else ""
-    verb, them = ("was", "it") if len(parts) == 1 else ("were", "them")
+    parts = [_with_sizes(alike, kind) for alike in _by_kind(diagnosis.effects)]
+    listed = in_a_row(parts)
+    verb, them = ("was", "it") if len(diagnosis.effects) == 1 else ("were", "them")
     stays = _stays(diagnosis.held_out)
     if not parts and diagnosis.verdict == "consistent":
         return f"Nothing is missing that these recordings show: {stays}."
@@ -33,11 +35,22 @@ def _stays(errors: FitErrors) -> str:
     return f"{over} {compact(errors.times_the_floor, 2)} times as much as white sensor noise makes them"
 
 
-def _with_size(effect: FoundEffect, kind: str) -> str:
-    """An effect in words with its first number."""
-    words = effect_in_words(effect.name, kind)
-    if not effect.parameters:
+def _by_kind(effects: Sequence[FoundEffect]) -> list[list[FoundEffect]]:
+    """Effects of one kind, whose first numbers have one unit, stand together."""
+    groups: dict[tuple[str, str], list[FoundEffect]] = {}
+    for effect in effects:
+        unit = effect.parameters[0].unit if effect.parameters else ""
+        groups.setdefault((effect.name.partition("/")[2], unit), []).append(effect)
+    return list(groups.values())
+
+
+def _with_sizes(effects: Sequence[FoundEffect], plant_kind: str) -> str:
+    """Effects of one kind in words with their first numbers."""
+    kind = effects[0].name.partition("/")[2]
+    words = kind_at([effect.name.partition("/")[0] for effect in effects], kind, plant_kind)
+    if not effects[0].parameters:
         return words
-    first = effect.parameters[0]
-    unit = "" if first.unit == "1" else f" {first.unit}"
-    return f"{words} ({first.name.rpartition('.')[2]} = {first.value:.3g}{unit})"
+    firsts = [effect.parameters[0] for effect in effects]
+    unit = "" if firsts[0].unit == "1" else f" {firsts[0].unit}"
+    sizes = in_a_row([f"{first.value:.3g}" for first in firsts])
+    return f"{words} ({firsts[0].name.rpartition('.')[2]} = {sizes}{unit})"
