@@ -28,7 +28,7 @@ from wipx.core.errors import InputError, unknown_name
 from wipx.core.locked import locked
 from wipx.core.whole_file import write_whole
 from wipx.renamed import renamed, spelled_out, unambiguous
-from wipx.sweep import RunFailed, watch_ended
+from wipx.sweep import RunFailed, check_launcher, watch_ended
 from wipx.tasks.files.finished import ERROR, SETTINGS
 from wipx.tasks.files.results import UNFINISHED
 from wipx.tasks.files.sweep_folder import RUNNING, begin_job, end_job
@@ -120,6 +120,7 @@ def run_task(config: DictConfig, out: Path) -> None:
         chosen=dict(HydraConfig.get().runtime.choices) if HydraConfig.initialized() else {},
         sweep=sweep_of(out),
         overrides=tuple(HydraConfig.get().overrides.task) if HydraConfig.initialized() else (),
+        launcher=_launcher(),
     )
     part("task").run(job)
     write_whole(out / SETTINGS, OmegaConf.to_yaml(OmegaConf.create(settings)).rstrip())
@@ -130,6 +131,17 @@ def sweep_of(out: Path) -> Path | None:
     if not HydraConfig.initialized() or HydraConfig.get().mode is not RunMode.MULTIRUN:
         return None
     return out.parent
+
+
+def _launcher() -> tuple[str, ...]:
+    """What the command line of a single run asks of a launcher, which must be installed; its task may hand out jobs."""
+    if not HydraConfig.initialized() or HydraConfig.get().mode is not RunMode.RUN:
+        return ()
+    composed = HydraConfig.get()
+    asked = tuple(o for o in composed.overrides.hydra if o.lstrip("+").startswith(("hydra/launcher", "hydra.launcher")))
+    if asked:
+        check_launcher(str(composed.launcher._target_), str(composed.runtime.choices["hydra/launcher"]))
+    return asked
 
 
 def explanation(error: BaseException) -> str | None:

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra._internal.core_plugins.basic_sweeper import BasicSweeper  # hydra's own option hydra/sweeper=basic
 from hydra.core.global_hydra import GlobalHydra
@@ -90,7 +90,8 @@ def check_launcher(target: str, option: str) -> None:
 def jobs_of(config: DictConfig) -> list[list[str]]:
     """What each job of a sweep is asked to do, as KEY=VALUE, in the order of Hydra's sweeper."""
     swept = [f"{key}={value}" for key, value in (config.hydra.sweeper.params or {}).items()]
-    asked = [*swept, *OmegaConf.to_container(config.hydra.overrides.task, resolve=False)]  # type: ignore[misc]
+    given = OmegaConf.to_container(config.hydra.overrides.task, resolve=False)  # a label's ${...} is each job's own
+    asked = [*swept, *cast(list[str], given)]
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
     overrides = OverridesParser.create(config_loader=hydra.config_loader).parse_overrides(asked)

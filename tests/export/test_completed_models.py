@@ -15,6 +15,7 @@ from wipx.core.export_result import FILE, RUNTIME, WIPX
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import PLANTS, Plant, robot_plant
 from wipx.core.recording import Recording
+from wipx.effects.catalogue import vocabulary
 from wipx.export.judged import judged
 from wipx.export.mjcf import export_mjcf
 from wipx.recordings.robot_model import read_tree
@@ -27,50 +28,72 @@ WITHIN = 1.02  # of wipx's error
 NOISE = 1e-4  # [rad, m]
 WRONG = 0.02  # relative standard deviation of the numbers that a completion found
 HANGING = {"wip": (0.0, np.pi), "cartpole": (0.0, np.pi), "pendulum": (np.pi,)}  # where nothing falls over
-AT_JOINTS = {
+FRICTION = {  # one of them at a joint
     "coulomb": {"F_c": 0.1},
     "stribeck": {"F_c": 0.1, "F_s": 0.18, "v_s": 0.1},
+    "lagged_stribeck": {"F_s": 0.15, "F_c": 0.1, "v_s": 0.1, "sigma": 0.02, "epsilon": 1e-3, "alpha": 0.7},
     "presliding": {"F_c": 0.1, "stiffness": 20.0, "damping": 0.05},
-    "viscous": {"sigma": 0.05},
-    "quadratic_drag": {"c": 0.05},
+    "lugre": {"F_c": 0.1, "F_s": 0.15, "v_s": 0.1, "stiffness": 20.0, "damping": 0.05},
+    "hysteresis": {"F_c": 0.1, "stiffness": 20.0, "damping": 0.05, "n": 2.0, "gamma": 0.1},
     "asymmetric_coulomb": {"F_plus": 0.12, "F_minus": 0.06},
-    "rotor_inertia": {"J": 0.02},
 }
-FRICTION = ("coulomb", "stribeck", "presliding", "asymmetric_coulomb")  # one of them at a joint
+DRAG = {"viscous": {"sigma": 0.05}, "quadratic_drag": {"c": 0.05}}
+AT_JOINTS = {
+    "rotor_inertia": {"J": 0.02},
+    "spring": {"k": 0.2, "q0": 0.1, "x0": 0.1},
+    "load_friction": {"K_motor": 0.05, "K_external": 0.05},
+    "sticky_spot": {"F_c": 0.05, "lo": -0.1, "hi": 0.1},
+}
 AT_DRIVES = {
     "gain": {"k": 0.9},
     "offset": {"F_0": 0.05},
     "dead_zone": {"band": 0.08},
     "delay": {"tau": 0.008},
+    "kp": {"factor": 0.9},
+    "kd": {"factor": 0.9},
     "lag": {"tau": 0.01},
     "saturation": {"F_max": 1.5},
     "ripple": {"A": 0.05, "n": 5.0, "phase": 0.3},
     "backlash": {"gap": 0.01},
+    "back_emf": {"k_e": 0.02},
+    "speed_limit": {"F_stall": 3.0, "v_free": 8.0},
 }
-AT_SENSORS = {"delay": {"tau": 0.006}, "scale": {"e": 0.02}}
+AT_SENSORS = {"delay": {"tau": 0.006}, "scale": {"e": 0.02}, "bias": {"b": 0.01}}
+ELSEWHERE = {  # at bodies, base and rail
+    "payload": {"mass": 0.2, "height": 0.3, "x": 0.05, "y": 0.0, "z": 0.1},
+    "payload_event": {"mass": 0.2, "height": 0.3, "t0": 0.5},
+    "com_offset": {"theta_eq": 0.02, "x": 0.01, "y": 0.0, "z": 0.01},
+    "inertia": {"scale": 1.1},
+    "base_tilt": {"roll": 0.02, "pitch": 0.02},
+    "rail_tilt": {"angle": 0.01},
+}
 
 
 def drawn(plant: Plant, rng: np.random.Generator) -> dict[str, dict[str, float]]:
-    """Friction at every joint, and at each drive and sensor something in three cases of four."""
+    """Friction at every joint, and at each joint, drive, sensor and body something more in some cases."""
     found: dict[str, dict[str, float]] = {}
+    known = vocabulary(plant)
 
-    def put(site: str, kinds: list[str], known: dict) -> None:
-        kind = str(rng.choice(kinds))
-        found[f"{site}/{kind}"] = {name: value * rng.uniform(0.7, 1.3) for name, value in known[kind].items()}
+    def put(site: str, numbers: dict[str, dict[str, float]], share: float = 1.0) -> None:
+        kinds = [kind for kind in numbers if f"{site}/{kind}" in known]
+        if kinds and rng.random() < share:
+            kind = str(rng.choice(kinds))
+            have = [parameter.name for parameter in known[f"{site}/{kind}"].parameters]
+            found[f"{site}/{kind}"] = {
+                name: value * rng.uniform(0.7, 1.3) for name, value in numbers[kind].items() if name in have
+            }
 
     for joint in plant.joints:
-        put(joint, list(FRICTION), AT_JOINTS)
-        put(joint, ["viscous", "quadratic_drag"], AT_JOINTS)
-    drives = ["actuator"] if plant.tree is None else [f"actuator_{joint}" for joint in plant.actuated]
-    for site in drives:
-        if rng.random() < 0.75:
-            put(site, list(AT_DRIVES), AT_DRIVES)
-    for column in plant.coordinates:
-        if rng.random() < 0.3:
-            put(f"sensor_{column}", list(AT_SENSORS), AT_SENSORS)
-    if plant.tree is not None and rng.random() < 0.5:
-        body = str(rng.choice([link.body for link in plant.tree.links]))
-        found[f"link_{body}/payload"] = {"mass": 0.2, "x": 0.05, "y": 0.0, "z": 0.1}
+        put(joint, FRICTION)
+        put(joint, DRAG)
+        put(joint, AT_JOINTS, 0.5)
+    for site in plant.sites:
+        if plant.class_of(site) in ("actuator", "drive"):
+            put(site, AT_DRIVES, 0.75)
+        elif site.startswith("sensor_"):
+            put(site, AT_SENSORS, 0.3)
+        elif site not in plant.joints:
+            put(site, ELSEWHERE, 0.5 / len(plant.joints))
     return found
 
 
@@ -130,8 +153,10 @@ def test_with_the_runtime_the_error_is_that_of_wipx(number: int, tmp_path: Path,
     shares = {
         way: max(errors.rms[way][name] / errors.rms[WIPX][name] for name in errors.noise_floor) for way in errors.rms
     }
+    kinds = sorted({name.partition("/")[2] for name in model.effects})
     print(
-        f"\n{model.plant.kind} of {len(model.plant.joints)} joints: {counts} effects exact, approximated, lost; error "
-        f"over wipx's: runtime {shares[RUNTIME]:.4f}, file alone {shares[FILE]:.3g}"
+        f"\n{', '.join(kinds)}\n{model.plant.kind} of {len(model.plant.joints)} joints: "
+        f"{counts} effects exact, approximated, lost; "
+        f"error over wipx's: runtime {shares[RUNTIME]:.4f}, file alone {shares[FILE]:.3g}"
     )
     assert shares[RUNTIME] < WITHIN

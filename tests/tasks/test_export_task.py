@@ -86,7 +86,7 @@ def test_a_urdf_says_less(program, pendulum: Path, tmp_path: Path):
         (("model.path=null",), "task=export needs a completed model; give model.path="),
         (("model.path=nowhere.yaml",), "nowhere.yaml"),
         (("task.step=0",), "step is 0, expected a positive number"),
-        (("recordings.path=other",), "choose recordings of the same robot"),
+        (("recordings.path=other",), "choose those of the same robot"),
     ],
 )
 def test_bad_input_is_one_line(program, pendulum: Path, tmp_path: Path, change: tuple[str, ...], expected: str):

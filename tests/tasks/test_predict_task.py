@@ -32,7 +32,7 @@ def truth(recordings: Path, file: Path, effects: dict) -> Path:
     return file
 
 
-@pytest.mark.parametrize("name", MISSING)
+@pytest.mark.parametrize("name", ["two_effects", "pendulum"])
 def test_predictions_have_the_rows_of_the_recordings(program, examples: Path, tmp_path: Path, name: str):
     recordings = examples / name / "unseen"
     answer = program("task=predict", f"recordings.path={recordings}", "hydra.run.dir=out")

@@ -28,7 +28,7 @@ from wipx.recordings.tree_file import plant_from_mapping, plant_to_mapping
 SCHEMA = 1
 ROBOT = "robot"  # plant whose mechanics a model file gives
 MODEL_KEYS = ("plant", "parameters", "effects", "bandwidths", "model", "locked", "drives", "tree")
-ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads", "limits")
+ROBOT_KEYS = (*MODEL_KEYS, "uncertainty", "controller", "signals", "loads", "limits", "emulated")
 
 
 def write_model(model: Model, path: Path) -> None:

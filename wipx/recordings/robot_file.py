@@ -67,6 +67,7 @@ class RobotDescription:
         signals: Columns of contract section 1 that the log has under another name, unit or sign.
         loads: Known loads by name; a recording that none of them claims is of the robot without load.
         limits: Of the joints of a robot from a model file, which no experiment may leave.
+        emulated: Whether the recordings are of an emulated robot, not of a real one.
     """
 
     model: Model
@@ -75,11 +76,12 @@ class RobotDescription:
     signals: Mapping[str, Signal]
     loads: Mapping[str, KnownLoad] = field(default_factory=dict)
     limits: Mapping[str, JointLimits] = field(default_factory=dict)
+    emulated: bool = False
 
     def __reduce__(self):
         # Mapping proxies do not pickle; rebuild from plain dictionaries.
         plain = (dict(self.uncertainty), self.controller, dict(self.signals), dict(self.loads), dict(self.limits))
-        return RobotDescription, (self.model, *plain)
+        return RobotDescription, (self.model, *plain, self.emulated)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "uncertainty", MappingProxyType(dict(self.uncertainty)))
@@ -131,7 +133,11 @@ def robot_from_mapping(data: Mapping[str, object], where: str, folder: Path | No
     loads = {n: _load(n, c, model, f"{where}: loads") for n, c in mapping_of(data, "loads", where).items()}
     given = mapping_of(data, "limits", where)
     limits = {joint: _limits(joint, given[joint], model.plant, f"{where}: limits") for joint in given}
-    return RobotDescription(model, uncertainty, _controller(data, model.plant, where), signals, loads, limits)
+    emulated = data.get("emulated", False)
+    if not isinstance(emulated, bool):
+        raise InputError(f"{where}: emulated is {emulated!r}, expected true or false")
+    controller = _controller(data, model.plant, where)
+    return RobotDescription(model, uncertainty, controller, signals, loads, limits, emulated)
 
 
 def _check_input_gain(signals: Mapping[str, Signal], plant: Plant, *, given: bool, where: str) -> None:

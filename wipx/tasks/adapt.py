@@ -69,7 +69,7 @@ def _result(job: Job, source: RecordingSource, adapted: Adapted, problem: Adapta
         optimizer=str(job.chosen["optimizer"]) if history is not None else "",
         engine=str(job.chosen["sim"]),
         seed=job.seed,
-        target=str(source.path),
+        target=source.place,
         fit=adapted.fit,
         held_out=adapted.held_out,
         parameters=adapted.parameters,

@@ -38,7 +38,7 @@ class RunBaseline:
         if description.model.plant.tree is not None and not baseline.of_trees:
             name = job.chosen.get("baseline", type(baseline).__name__)
             raise InputError(
-                f"{source.path}: baseline={name} cannot do a robot from a model file yet; use baseline=all_at_once"
+                f"{source.place}: baseline={name} cannot do a robot from a model file yet; use baseline=all_at_once"
             )
         nominal = job.part("plant").nominal(description.model)
         recordings = source.load()
@@ -48,7 +48,7 @@ class RunBaseline:
         answer = baseline.answer(case, np.random.default_rng(job.seed))
         seconds = time.perf_counter() - begun
         errors = _errors(case, answer)
-        content = diagnosis(answer, errors, case) | {"source": str(source.path), "seconds": seconds}
+        content = diagnosis(answer, errors, case) | {"source": source.place, "seconds": seconds}
         (job.out / NETWORK).unlink(missing_ok=True)  # of an earlier run
         with written_together(job.out) as folder:
             write_json(folder / "diagnosis.json", content)

@@ -1,6 +1,6 @@
 """`task=diagnose`: say what physics a nominal model lacks, and leave the completed model."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,10 @@ from wipx.tasks.files.results import write_csv, write_json, written_together
 from wipx.tasks.files.tracked import error_metrics, log_run, note_run, parameter_metrics, recorded_data
 from wipx.tasks.shared.job import Job
 from wipx.tasks.shared.progress import StageProgress
+from wipx.tasks.shared.proposed import record_command
 from wipx.tracking.run_note import DataNote
+
+EMULATED = "The recordings are of an emulated robot, not of a real one."
 
 
 @dataclass(frozen=True)
@@ -59,17 +62,22 @@ class Diagnose:
                 robot,
                 simulator,
                 title=source.name,
-                source=str(source.path) if source.robot is None else "recordings.robot",
+                source=source.place if source.robot is None else "recordings.robot",
                 rng=np.random.default_rng(job.seed),
                 watcher=progress,
                 suspects=self.suspects,
                 rules=job.part("diagnosis"),
             )
+        if description.emulated:
+            diagnosis = replace(diagnosis, notes=(EMULATED, *diagnosis.notes))
         with written_together(job.out) as folder:
             write_diagnosis(diagnosis, folder)
             _note(job, folder, diagnosis, recorded_data(source, recordings, "diagnosis"))
         log_run(job)
         print(summary(diagnosis))
+        command = record_command(diagnosis, source, job.out)
+        if command is not None:
+            print(f"record it: {command}")
         print(f"\npage: {job.out / 'report.html'}")
         return diagnosis
 

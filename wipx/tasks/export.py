@@ -70,8 +70,8 @@ class Export:
         described = source.describe().model.plant
         if described.coordinates != model.plant.coordinates or described.commands != model.plant.commands:
             raise InputError(
-                f"{job.model_path}: a model with {', '.join(model.plant.coordinates)}, the recordings in {source.path} "
-                f"are of a robot with {', '.join(described.coordinates)}; choose recordings of the same robot"
+                f"{job.model_path}: a model with {', '.join(model.plant.coordinates)}, the recordings in "
+                f"{source.place} are of a robot with {', '.join(described.coordinates)}; choose those of the same robot"
             )
         with StageProgress("export") as progress:
             errors, said = judged(model, file, job.part("sim"), source.load(), progress)

@@ -92,7 +92,7 @@ def _result(
     return IdentificationResult(
         title=source.name,
         plant=plant.kind,
-        source=str(source.path),
+        source=source.place,
         split=split.rule,
         objective=objective.describe(),
         units={column: plant.unit_of(column) for column in columns},

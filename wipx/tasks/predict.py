@@ -43,7 +43,7 @@ class Predict:
         with written_together(job.out) as folder:
             for trace in traces:
                 table = {"t": trace.t, **{name: trace.completed[name] for name in columns}}
-                write_csv(folder / PurePath(trace.name).with_suffix(".csv").name, table)
+                write_csv(folder / _file_name(trace.name, joined=isinstance(source.path, list)), table)
             write_json(
                 folder / "metrics.json",
                 {
@@ -91,3 +91,9 @@ class Predict:
 
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.nanmean(values**2))) if np.isfinite(values).any() else float("nan")
+
+
+def _file_name(recording: str, *, joined: bool) -> str:
+    """The file that takes the predictions of a recording; one of several joined folders keeps its folder's name."""
+    path = PurePath(recording).with_suffix(".csv")
+    return "_".join(path.parts) if joined else path.name

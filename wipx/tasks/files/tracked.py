@@ -105,7 +105,7 @@ def recorded_data(source: RecordingSource, recordings: Iterable[Recording], cont
         digest.update(recording.name.encode())
         for column in recording.columns.values():
             digest.update(column.tobytes())
-    return DataNote(robot_name(source), str(source.path), digest.hexdigest()[:12], context)
+    return DataNote(robot_name(source), source.place, digest.hexdigest()[:12], context)
 
 
 def training_data(card: Mapping[str, Any]) -> DataNote:
@@ -116,7 +116,9 @@ def training_data(card: Mapping[str, Any]) -> DataNote:
 
 def robot_name(source: RecordingSource) -> str:
     """The title of recordings, or their folder with the one that it is in: many folders are called "recordings"."""
-    return source.title or "/".join(Path(str(source.path)).resolve().parts[-2:])
+    if source.title or not isinstance(source.path, str):
+        return source.name
+    return "/".join(Path(source.path).resolve().parts[-2:])
 
 
 def _swept(job: Job) -> str:

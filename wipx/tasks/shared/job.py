@@ -26,6 +26,7 @@ class Job:
         chosen: Option that was chosen of each group, by group; empty where a run was put together otherwise.
         sweep: Folder of the sweep that the run is a job of; None for a single run.
         overrides: What the command line asked for, each as KEY=VALUE.
+        launcher: What the command line asked of hydra/launcher, each as KEY=VALUE; empty in a job of a sweep.
         started: Time at which the run began [s since the epoch].
     """
 
@@ -41,4 +42,5 @@ class Job:
     chosen: Mapping[str, str] = field(default_factory=dict)
     sweep: Path | None = None
     overrides: tuple[str, ...] = ()
+    launcher: tuple[str, ...] = ()
     started: float = field(default_factory=time.time)
