@@ -81,12 +81,19 @@ def test_random_starts_lie_in_the_cube_and_crowd_around_the_neutral_value(count:
         assert np.median(np.abs(starts - space.neutral)) < 0.1
 
 
-def test_a_number_that_is_not_exact_gets_a_gaussian_prior():
+def test_the_prior_of_a_mass_that_is_not_exact_is_one_of_the_factor_by_which_it_is_wrong():
     space = space_of(uncertainty={"body_inertia": 0.1})
     value = PENDULUM.parameters["body_inertia"]
-    at = space.to_cube(np.array([[value], [1.1 * value], [0.8 * value]]))
+    at = space.to_cube(value * np.exp([[0.0], [0.1], [-0.2]]))
     np.testing.assert_allclose(space.prior_residuals(at), [[0.0], [1.0], [-2.0]], atol=1e-9)
     assert space.free[0].low < 0.7 * value < 1.3 * value < space.free[0].high
+
+
+def test_however_uncertain_a_mass_is_it_does_not_vanish():
+    space = space_of(uncertainty={"body_mass": 0.5})
+    nearly_nothing = space.prior_residuals(np.zeros((1, 1)))
+    assert space.free[0].low > 0.0
+    np.testing.assert_allclose(nearly_nothing, -4.0)
 
 
 def test_a_freed_number_without_deviation_has_no_prior():

@@ -172,6 +172,7 @@ class Effect:
             empty.
         non_smooth: Why slopes of its likelihood mislead; None where they do not.
         doubt: Relative standard deviation of its first number by what its law leaves open.
+        usual: Whether nearly every machine has it, so that less evidence will do.
         outside_vocabulary: Whether contract section 3 lacks it. A diagnosis names such an effect only where those of
             the contract leave something over.
         on_machines: Whether contract section 6 has it at a site of a plant all the same; None for nowhere.
@@ -203,6 +204,7 @@ class Effect:
     scan: str = ""
     non_smooth: NonSmooth | None = None
     doubt: float = 0.0
+    usual: bool = False
     outside_vocabulary: bool = False
     on_machines: Callable[[str, Plant], bool] | None = None
     excludes: tuple[str, ...] = ()

@@ -105,8 +105,10 @@ class FreeParameter:
         high: Upper bound [unit].
         start: Where the search begins [unit].
         neutral: Value before the identification: that of an absent effect, or the nominal one [unit].
-        prior_mean: Centre of a Gaussian prior [unit]; None without a prior.
+        prior_mean: Centre of a prior [unit]; None without a prior.
         prior_std: Its standard deviation [unit].
+        of_factor: Whether the prior is one of the factor by which the number is wrong (log-normal), as suits masses,
+            inertias and gains, which are never zero; else it is Gaussian.
     """
 
     name: str
@@ -117,3 +119,4 @@ class FreeParameter:
     neutral: float
     prior_mean: float | None = None
     prior_std: float | None = None
+    of_factor: bool = False

@@ -245,7 +245,9 @@ class ResidualRules:
 class TrustRules:
     """Whether laws hold, or only nearly."""
 
-    far_off: float = rule(5.0, "noise floors", "errors of predictions that are far off", DEVELOPING, UNLIMITED)
+    far_off: float = rule(
+        5.0, "times what noise makes them", "errors of predictions that are far off", DEVELOPING, UNLIMITED
+    )
     near_floor: float = rule(
         2.5, "noise floors", "errors of a right model's predictions, at most", DEVELOPING, UNLIMITED
     )
@@ -266,8 +268,8 @@ class TrustRules:
     foretold: float = rule(
         0.5,
         "of the variance of innovations",
-        "share that earlier ones foretell on every joint of an arm, beyond which its laws hold only nearly",
-        "derived: a right model leaves white noise; at most 0.005 on an exact arm, at least 0.95 on a real one",
+        "share that earlier ones foretell, beyond which a joint's large errors are no noise",
+        "derived: most of it; at most 0.8 with a sensor's lasting noise, at least 0.8 on real machines",
         UNLIMITED,
     )
     smoothed: float = rule(

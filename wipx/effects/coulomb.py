@@ -23,4 +23,5 @@ EFFECT = Effect(
     rows={"LEVEL_PLUS": "F_c", "LEVEL_MINUS": "F_c"},
     parts=("FRICTION",),
     built_in="frictionloss",
+    usual=True,
 )

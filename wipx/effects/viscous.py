@@ -21,4 +21,5 @@ EFFECT = Effect(
     parts=("DAMPING",),
     linear_at_rest="viscous",
     built_in="damping",
+    usual=True,
 )

@@ -86,7 +86,9 @@ class ParameterSpace:
         values = self.to_values(np.atleast_2d(cube))
         mean, std = self._priors()
         held = ~np.isnan(std)
-        return ((values - mean) / std)[:, held]
+        of_factor = np.array([p.of_factor for p in self.free], dtype=bool)
+        factors = np.where(of_factor, values / np.where(of_factor, mean, 1.0), 1.0)
+        return (np.where(of_factor, mean * np.log(factors), values - mean) / std)[:, held]
 
     def _priors(self) -> tuple[np.ndarray, np.ndarray]:
         mean = np.array([np.nan if p.prior_mean is None else p.prior_mean for p in self.free])
@@ -167,7 +169,11 @@ def _nominal_parameter(name: str, model: Model, deviation: float | None) -> Free
     else:
         known = model.plant.parameters[name]
         unit, size = known.unit, 1.0 if known.absolute else size
-        lowest = value / FREE_RANGE if value > 0.0 and not known.absolute else -np.inf
+        lowest = -np.inf
+        if deviation is not None and value > 0.0 and not known.absolute:
+            factor = min(float(np.exp(min(PRIOR_RANGE * deviation, 100.0))), FREE_RANGE)
+            std = deviation * value
+            return FreeParameter(name, unit, value / factor, value * factor, value, value, value, std, of_factor=True)
     if deviation is not None:
         reach = PRIOR_RANGE * deviation * size
         low = max(value - reach, lowest)

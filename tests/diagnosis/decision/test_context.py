@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from diagnosis.recorded import SIMULATOR, bench
+import numpy as np
+from diagnosis.recorded import SIMULATOR, bench, coloured
 
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
@@ -20,3 +21,29 @@ def test_a_model_that_predicts_far_worse_than_the_nominal_one_is_not_trusted(fre
     assert not context.is_worse(right)
     assert context.is_worse(wrong)
     assert not context.is_trusted(wrong)
+
+
+def test_a_model_whose_misfit_looks_like_noise_that_lasts_is_not_trusted(fresh_seed: int):
+    case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.3}}, fresh_seed)
+    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    friction = {"translation/coulomb.F_c": 0.3}
+    without, right = (
+        context.fitter.fit(Hypothesis.of(case.setting, effects, friction), case.quiet, steps=0)
+        for effects in ((), ("translation/coulomb",))
+    )
+    assert context.is_quiet(without)  # the noise of the sensor takes it all
+    assert context.unruly_joints(without) == ("translation",)
+    assert not context.is_trusted(without)
+    assert context.unruly_joints(right) == ()
+    assert context.is_trusted(right)
+
+
+def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed: int):
+    case = bench("linear_axis", {}, fresh_seed)
+    recordings = coloured(case.recordings, np.random.default_rng(fresh_seed))
+    context = Context.of(recordings, case.setting, SIMULATOR, USUAL)
+    fit = context.fitter.converged(context.fitter.fit(Hypothesis.of(case.setting, (), {}), context.first_levels))
+    assert context.fitter.foretold(fit)[0] > USUAL.trust.foretold
+    assert context.errors(fit).times_the_floor > USUAL.trust.near_floor
+    assert context.unruly_joints(fit) == ()
+    assert context.is_trusted(fit)

@@ -73,6 +73,14 @@ def test_friction_holds_beside_numbers_in_doubt_and_what_is_not_there_does_not(f
     assert not fitter.holds(friction, spring)
 
 
+def test_a_law_of_nearly_every_machine_is_preferred_and_needs_less_evidence(fresh_seed: int):
+    fitter = forecasts(bench("linear_axis", FRICTION, fresh_seed, count=2))
+    usual, rare = fitter.odds_of(("translation/coulomb",)), fitter.odds_of(("actuator/dead_zone",))
+    assert usual == fitter.odds_of(())
+    assert usual - rare == pytest.approx(np.log(fitter.looked_at))
+    assert fitter.odds_of(("translation/viscous", "actuator/dead_zone", "actuator/ripple")) == pytest.approx(2.0 * rare)
+
+
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):
     hidden = {"sensor_theta/delay": {"tau": 0.015}}
     case = bench("pendulum", hidden, fresh_seed, count=3)

@@ -38,7 +38,7 @@ from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_effects, simple_law
 from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import effect_of
-from wipx.effects.words import effect_in_words, in_a_row
+from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.diagnosis_sentence import sentence
 from wipx.sim.simulator import StateFeedback
 
@@ -229,7 +229,8 @@ def _unexplained(context: Context, rest: Rest, unruly: tuple[str, ...]) -> Unexp
         words = " and ".join(effect_in_words(name, context.data.plant.kind) for name in outside_vocabulary)
         return Unexplained(True, rest.p_value, outside_vocabulary[0].partition("/")[0], words, rest.resembles, None)
     if unruly and (not rest.significant or rest.strongest is None):
-        words = f"predictions of {in_a_row(unruly)} err far more than noise makes them"
+        places = in_a_row([site_in_words(joint, context.data.plant.kind) for joint in unruly])
+        words = f"predictions of {places} err far more than noise makes them"
         return Unexplained(True, rest.p_value, unruly[0], words, rest.resembles, None)
     if not rest.significant or rest.strongest is None:
         return Unexplained(False, rest.p_value, None, "", (), None)

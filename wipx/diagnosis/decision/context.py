@@ -79,10 +79,10 @@ class Context:
         errors = self.errors(fit)
         if errors.times_the_floor <= self.rules.trust.near_floor:
             return True
-        if self.is_worse(fit):
+        if self.is_worse(fit) or self.unruly_joints(fit):
             return False
         if self.data.plant.tree is not None:  # a slow filter loses the fast motion of an arm, however right its model
-            return not self.unruly_joints(fit)
+            return True
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
         judge = replace(self.judge, bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
@@ -94,19 +94,19 @@ class Context:
         return not by_row.asks_for_force(seen.levels, self.setting.scales).any()
 
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
-        """Joints of an arm whose laws hold nearly at best, and whose predictions err far more than noise makes them.
+        """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors and that of the forces which the observer asks for: white
-        forces of spectral density q on a body of mass matrix M move it by M^-1 q sqrt(t^3 / 3) in a time t.
+        The worst is first. Noise is that of the sensors, also what lasts of it, which innovations show; and that of the
+        forces which the observer asks for: white forces of spectral density q on a body of mass matrix M move it by
+        M^-1 q sqrt(t^3 / 3) in a time t.
         """
         plant = self.data.plant
-        if plant.tree is None:
-            return ()
         by_row, seen = self.fitter.seen_by_row(fit)
         shaken = by_row.innovations_model.linear.b * seen.levels.force  # (places, joints, joints)
         moved = np.sqrt(np.mean(np.sum(shaken**2, axis=2), axis=0) * HORIZON**3 / 3.0)
         errors = self.errors(fit)
-        noise = np.hypot([errors.noise_floor[name] for name in plant.coordinates], moved)
+        floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
+        noise = np.sqrt(floor**2 + moved**2 + by_row.innovation_sizes(seen) ** 2)
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
         wrong = (times > self.rules.trust.far_off) & (by_row.foretold(seen) > self.rules.trust.foretold)
         return tuple(plant.joints[j] for j in np.argsort(-times) if wrong[j])

@@ -58,6 +58,7 @@ class Fit:
         rows: Number of errors that count as independent.
         jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N + priors, D).
         log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
+        odds: Logarithm of how likely its effects are beforehand, compared with those that nearly every machine has.
     """
 
     hypothesis: Hypothesis
@@ -68,6 +69,7 @@ class Fit:
     rows: int
     jacobian: np.ndarray
     log_likelihood: float
+    odds: float
 
     @property
     def motion_likelihood(self) -> float:
@@ -164,6 +166,10 @@ class Fitter(ABC):
             larger: The larger fit.
             explained: What the smaller one explains already [nats].
         """
+
+    @abstractmethod
+    def odds_of(self, effects: tuple[str, ...]) -> float:
+        """Logarithm of how likely effects are beforehand, compared with those that nearly every machine has."""
 
     @abstractmethod
     def holds(self, smaller: Fit, larger: Fit) -> bool:
@@ -315,7 +321,9 @@ class Fitter(ABC):
         i = int(np.argmax(likelihoods))
         white = self.whitened(errors[i : i + 1], noise[i])[0]
         slopes = np.zeros((white.size + priors.shape[1], cubes.shape[1]))
-        return Fit(hypothesis.at(cubes[i]), levels, noise[i], white, self.blocks, self.rows, slopes, likelihoods[i])
+        odds = self.odds_of(hypothesis.effects)
+        best = hypothesis.at(cubes[i])
+        return Fit(best, levels, noise[i], white, self.blocks, self.rows, slopes, likelihoods[i], odds)
 
     def _proposals(self, fit: Fit) -> np.ndarray:
         """Positions to try next, one for each damping, within the cube."""

@@ -29,7 +29,7 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import EvidenceRules, Rules
-from wipx.effects.catalogue import vocabulary
+from wipx.effects.catalogue import kind_of, vocabulary
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
 from wipx.identify.starts import leads_of, starts_by
@@ -212,19 +212,27 @@ class ForecastFitter(Fitter):
         """Whether stretches of time agree that the larger one predicts recordings better that it was not fitted to.
 
         Vuong's test on the differences of their likelihoods (1989, Econometrica 57(2)), at a level for all effects that
-        are looked at together; effects that recorded forces ask for were not picked from so many. In long recordings it
-        must also matter, not only be certain.
+        are looked at together; likely ones were not picked from so many. In long recordings it must also matter, not
+        only be certain.
         """
         kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
         count, rules = len(kept), self.rules.forecasts
-        added = set(larger.effects) - set(smaller.effects)
-        looked_at = 1 if all(map(self.doubted.expects, added)) else self._looked_at
-        reach = -float(ndtri(min(rules.level / looked_at, 0.5)))
+        picked_from = 1 if all(map(self._is_likely, set(larger.effects) - set(smaller.effects))) else self.looked_at
+        reach = -float(ndtri(min(rules.level / picked_from, 0.5)))
         chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
-        return float(kept.sum()) >= max(self.rules.selection.least_gain, chance, rules.matters * self.rows)
+        least = self.rules.selection.least_gain - float(np.log(self.looked_at / picked_from))
+        return float(kept.sum()) >= max(least, chance, rules.matters * self.rows)
+
+    def odds_of(self, effects: tuple[str, ...]) -> float:
+        """Those of picking an effect from all that are looked for, unless it is likely."""
+        return -float(np.log(self.looked_at)) * sum(not self._is_likely(effect) for effect in effects)
+
+    def _is_likely(self, effect: str) -> bool:
+        """Whether nearly every machine has an effect, or recorded forces ask for it."""
+        return kind_of(effect).usual or self.doubted.expects(effect)
 
     @cached_property
-    def _looked_at(self) -> int:
+    def looked_at(self) -> int:
         """How many effects are looked for."""
         return sum(self.looks_for(name, effect) for name, effect in vocabulary(self.data.plant).items())
 
@@ -280,8 +288,8 @@ class ForecastFitter(Fitter):
         return np.where(self._counted, scale - 0.5 * np.sum(fit.white**2, axis=1), 0.0)
 
     def lead(self, fit: Fit, other: Fit, score: float) -> float:
-        """What it predicts held-out stretches better, beside numbers in doubt."""
-        return float(np.sum(self._held_out(fit) - self._held_out(other)))
+        """What it predicts held-out stretches better, beside numbers in doubt, and how much likelier it was before."""
+        return float(np.sum(self._held_out(fit) - self._held_out(other))) + fit.odds - other.odds
 
     def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
         """As stretches of time agree on it (Vuong 1989): where no law holds, one predicts this better, another that."""

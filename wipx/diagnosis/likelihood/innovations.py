@@ -103,6 +103,10 @@ class InnovationFitter(Fitter):
         share = rules.nonsmooth_share if nonsmooth_search.leaves_open(smaller, added) else rules.least_share
         return max(rules.least_gain, min(share * explained, rules.most_asked))
 
+    def odds_of(self, effects: tuple[str, ...]) -> float:
+        """Nothing: where laws hold, there is evidence enough."""
+        return 0.0
+
     def holds(self, smaller: Fit, larger: Fit) -> bool:
         """Always: where laws hold, their likelihood says all."""
         return True
@@ -135,6 +139,13 @@ class InnovationFitter(Fitter):
         rows = self.data.counted.T[:, None]
         left = 1.0 / np.diag(fit.noise.whitening)[channels] ** 2
         return 1.0 - left * rows.sum() / np.maximum(np.sum(errors**2 * rows, axis=(0, 2)), 1e-300)
+
+    def innovation_sizes(self, fit: Fit) -> np.ndarray:
+        """Root mean square of each coordinate's innovations, shape (joints,) [m or rad]."""
+        observer, model, joints = self.innovations_model, fit.hypothesis.model, self.data.joints
+        expected = observer.estimated(model, observer.gains(fit.levels, model), fit.levels.spread)[:, :joints]
+        squares = (self.data.measured[:, :joints] - expected) ** 2 * self.data.counted[:, None]
+        return np.sqrt(squares.sum(axis=(0, 2)) / max(int(self.data.counted.sum()), 1))
 
     def holds_nowhere(self, fit: Fit) -> bool:
         """Whether the laws of a fit leave every joint of a robot an error that lasts: at best they hold nearly."""

@@ -25,9 +25,9 @@ def evidence(smaller: Fit, larger: Fit) -> float:
 
 
 def score(fit: Fit, base: Fit) -> float:
-    """Penalised evidence beyond a base [nats]."""
+    """Penalised evidence beyond a base, with the odds that the effects have beforehand [nats]."""
     own = sum(len(fit.hypothesis.parameters_of(effect)) for effect in fit.effects)
-    return evidence(base, fit) - 0.5 * own * np.log(fit.rows)
+    return evidence(base, fit) - 0.5 * own * np.log(fit.rows) + fit.odds
 
 
 @dataclass(frozen=True)
