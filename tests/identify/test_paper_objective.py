@@ -166,6 +166,6 @@ def test_priors_pull_as_strongly_as_the_noise_allows(releases: Releases):
     space = parameter_space(NOMINAL.with_effects(TRUTH.effects), (), {"wheel_mass": 0.01}, {}, {}, {})
     data = FitData(releases.recordings, NOMINAL, SIMULATOR, NOISE, scales.speeds, (FEEDBACK, RATE), releases.loads)
     problem = OBJECTIVE.problem(data, space)
-    off = space.to_cube(np.array([1.01 * NOMINAL.parameters["wheel_mass"]]))
+    off = space.to_cube(np.array([np.exp(0.01) * NOMINAL.parameters["wheel_mass"]]))
     prior = problem.losses(off)[0] - problem.class_losses(off).mean()
     assert prior == pytest.approx(np.mean(NOISE**2) / problem.target[0].size)
