@@ -43,7 +43,7 @@ def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed:
     recordings = coloured(case.recordings, np.random.default_rng(fresh_seed))
     context = Context.of(recordings, case.setting, SIMULATOR, USUAL)
     fit = context.fitter.converged(context.fitter.fit(Hypothesis.of(case.setting, (), {}), context.first_levels))
-    assert context.fitter.foretold(fit)[0] > USUAL.trust.foretold
+    assert context.by_row.foretold(fit)[0] > USUAL.trust.foretold
     assert context.errors(fit).times_the_floor > USUAL.trust.near_floor
     assert context.unruly_joints(fit) == ()
     assert context.is_trusted(fit)
