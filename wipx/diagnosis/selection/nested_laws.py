@@ -71,7 +71,7 @@ class FittedAt:
         for symbol, weight in weights.items():
             i = space.names.index(f"{self.effect}.{symbol}")
             slope[i] = weight * (space.free[i].high - space.free[i].low)
-        return float(np.sqrt(slope @ covariance(self.fit) @ slope))
+        return float(np.sqrt(max(slope @ covariance(self.fit) @ slope, 0.0)))
 
     @property
     def _joint(self) -> int:
