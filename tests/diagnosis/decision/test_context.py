@@ -26,9 +26,9 @@ def test_a_model_that_predicts_far_worse_than_the_nominal_one_is_not_trusted(fre
 def test_a_model_whose_misfit_looks_like_noise_that_lasts_is_not_trusted(fresh_seed: int):
     case = bench("linear_axis", {"translation/coulomb": {"F_c": 0.3}}, fresh_seed)
     context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
-    friction = {"translation/coulomb.F_c": 0.3}
+    friction, levels = {"translation/coulomb.F_c": 0.3}, replace(case.quiet, force=2.0 * case.quiet.force)
     without, right = (
-        context.fitter.fit(Hypothesis.of(case.setting, effects, friction), case.quiet, steps=0)
+        context.fitter.fit(Hypothesis.of(case.setting, effects, friction), levels, steps=0)
         for effects in ((), ("translation/coulomb",))
     )
     assert context.is_quiet(without)  # the noise of the sensor takes it all

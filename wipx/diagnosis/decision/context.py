@@ -108,7 +108,8 @@ class Context:
         floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
         noise = np.sqrt(floor**2 + moved**2 + by_row.innovation_sizes(seen) ** 2)
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
-        wrong = (times > self.rules.trust.far_off) & (by_row.foretold(seen) > self.rules.trust.foretold)
+        rules = self.rules.trust  # noise that lasts puts a right model far off where motion is unstable, not beyond
+        wrong = (times > rules.far_off * rules.distrusted) & (by_row.foretold(seen) > rules.foretold)
         return tuple(plant.joints[j] for j in np.argsort(-times) if wrong[j])
 
     def is_worse(self, fit: Fit) -> bool:
