@@ -261,8 +261,9 @@ class TrustRules:
     distrusted: float = rule(
         1.5,
         "times",
-        "ratio of errors to the nominal model's, or to those from the best states, beyond which a model is wrong",
-        "chosen on 24 exact generated robots: one at 1.51, the others below 1.4",
+        "ratio of errors to the nominal model's, to those from the best states, or to errors that are far off, beyond "
+        "which a model is wrong",
+        "chosen on 24 exact generated robots: one at 1.51, the others below 1.4; of far off on 34, one at 1.2",
         UNLIMITED,
     )
     foretold: float = rule(

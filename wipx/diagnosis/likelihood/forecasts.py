@@ -288,7 +288,7 @@ class ForecastFitter(Fitter):
         return np.where(self._counted, scale - 0.5 * np.sum(fit.white**2, axis=1), 0.0)
 
     def lead(self, fit: Fit, other: Fit, score: float) -> float:
-        """What it predicts held-out stretches better, beside numbers in doubt, and how much likelier it was before."""
+        """Its lead on held-out stretches, beside numbers in doubt, and in the odds that it has beforehand."""
         return float(np.sum(self._held_out(fit) - self._held_out(other))) + fit.odds - other.odds
 
     def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
