@@ -263,7 +263,7 @@ class TrustRules:
         "times",
         "ratio of errors to the nominal model's, to those from the best states, or to errors that are far off, beyond "
         "which a model is wrong",
-        "chosen on 24 exact generated robots: one at 1.51, the others below 1.4; of far off on 34, one at 1.2",
+        "chosen on 24 exact generated robots: one at 1.51, the others below 1.4; 34 err at most 1.2 times far off",
         UNLIMITED,
     )
     foretold: float = rule(
