@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.limits import JointLimits
@@ -65,6 +66,7 @@ class KnownRobot:
     limits: Mapping[str, JointLimits] = field(default_factory=dict)
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # on small matrices further threads only wait
 def diagnose(
     recordings: tuple[Recording, ...],
     robot: KnownRobot,

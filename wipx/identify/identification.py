@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from wipx.core.model import Model
 from wipx.core.recording import RecordingSplit
@@ -68,6 +69,7 @@ class Identified:
     notes: tuple[str, ...]
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # on small matrices further threads only wait
 def identify(
     request: Request,
     split: RecordingSplit,

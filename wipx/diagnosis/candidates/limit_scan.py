@@ -6,6 +6,7 @@ missing under each of many limits is enough to compare them all; the screening t
 
 import numpy as np
 
+from wipx.diagnosis.candidates.peaks import peaks
 from wipx.diagnosis.candidates.position_scan import left_of
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import FAST, drive_force, motion_of, response
@@ -56,18 +57,20 @@ def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, 
     left = left_of(fit, basis)
     gains = np.zeros(len(pairs))
     for begin in range(0, len(pairs), TOGETHER):
-        stall, free = pairs[begin : begin + TOGETHER, :, None, None].swapaxes(0, 1)
+        part = pairs[begin : begin + TOGETHER, :, None, None].swapaxes(0, 1)
         change = sum(
-            response(fitter, fit, joint, limited(force, rate, stall, free) - force)
+            response(fitter, fit, joint, limited(force, rate, *part) - force)
             for joint, force, rate in zip(joints, forces, rates, strict=True)
         )
         change = change - basis @ (basis.T @ change)
         gains[begin : begin + TOGETHER] = -(left @ change) - 0.5 * np.sum(change**2, axis=0)
-    best: list[int] = []
-    for i in np.argsort(-gains):
-        if gains[i] > 0.0 and all(_differ(pairs[i], pairs[j]) for j in best):
-            best.append(int(i))
-    return pairs[best[:GUESSES]]
+    stall, free = pairs.T
+
+    def same(i: int) -> np.ndarray:
+        ratio = np.maximum(stall, stall[i]) / np.minimum(stall, stall[i])
+        return (ratio <= SAME_LIMIT) & (free == free[i])
+
+    return pairs[peaks(gains, GUESSES, same)]
 
 
 def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -75,8 +78,3 @@ def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.nda
     driving = force * rate > 0.0
     size = stall * np.where(driving, np.maximum(1.0 - np.abs(rate) / free, 0.0), 1.0)
     return np.clip(force, -size, size)
-
-
-def _differ(one: np.ndarray, other: np.ndarray) -> bool:
-    stalls = max(one[0], other[0]) / min(one[0], other[0])
-    return bool(stalls > SAME_LIMIT or one[1] != other[1])

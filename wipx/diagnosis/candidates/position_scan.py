@@ -6,6 +6,7 @@ place is enough to compare them all; the screening then simulates the best ones.
 
 import numpy as np
 
+from wipx.diagnosis.candidates.peaks import peaks
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.force_response import direction, motion_of, response
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
@@ -50,11 +51,7 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) 
             force = -np.linalg.solve(normal[np.ix_(pair, pair)] + REGULARISATION * np.eye(2), score[pair])
             found.append((-0.5 * float(score[pair] @ force), np.hypot(*force), np.arctan2(-force[1], force[0])))
     gains, amplitudes, phases = np.array(found).T
-    best: list[int] = []
-    for i in np.argsort(-gains):
-        if all(abs(i - other) >= APART for other in best):
-            best.append(int(i))
-    chosen = best[:PEAKS]
+    chosen = peaks(gains, PEAKS, lambda i: np.abs(np.arange(len(gains)) - i) < APART)
     return np.column_stack([amplitudes[chosen], numbers[chosen], phases[chosen]])
 
 
@@ -83,11 +80,12 @@ def sticky_spots(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: 
     total = normal[high, high] - normal[low, high] - normal[high, low] + normal[low, low]
     level = -(score[high] - score[low]) / np.maximum(total, REGULARISATION)
     gains = np.where(level > 0.0, 0.5 * level**2 * total, 0.0)
-    best: list[int] = []
-    for i in np.argsort(-gains):
-        if gains[i] > 0.0 and all(_common(low[[i, j]], high[[i, j]]) < SAME_SPOT for j in best):
-            best.append(int(i))
-    chosen = best[:PEAKS]
+
+    def same(i: int) -> np.ndarray:
+        common = np.minimum(high, high[i]) - np.maximum(low, low[i])
+        return common >= SAME_SPOT * (np.maximum(high, high[i]) - np.minimum(low, low[i]))
+
+    chosen = peaks(gains, PEAKS, same)
     return np.column_stack([level[chosen], edges[low[chosen]], edges[high[chosen]]])
 
 
@@ -95,8 +93,3 @@ def left_of(fit: Fit, basis: np.ndarray) -> np.ndarray:
     """White innovations, freed of what a basis imitates."""
     white = fit.white.ravel()
     return white - basis @ (basis.T @ white)
-
-
-def _common(low: np.ndarray, high: np.ndarray) -> float:
-    """Share of the whole that two spots have in common, from their begins and ends."""
-    return (high.min() - low.max()) / (high.max() - low.min())

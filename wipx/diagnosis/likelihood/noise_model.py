@@ -72,7 +72,8 @@ def _fit_group(
     if not group:
         return 0.0
     signals, m, rows = list(group), len(whitening), int(counted.sum())
-    products = lagged_products(innovations[:, signals], counted, surprises)
+    # Contiguous: numba adds up a strided series one by one.
+    products = lagged_products(np.ascontiguousarray(innovations[:, signals]), counted, surprises)
     own, factor = _regressed(products, len(signals), rows)
     past = [lag * m + signal for lag in range(len(LAGS)) for signal in signals]
     known = [*past, *range(len(LAGS) * m, len(LAGS) * m + SURPRISES * surprises.shape[1])]
