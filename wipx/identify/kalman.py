@@ -158,40 +158,105 @@ def _moves(a, place, t, last):
 def _filter(moves, t, last, sensor, rate, late, gains, covariance, innovation):
     """Gains, covariances after each row, and inverse covariances of the innovations, of every recording."""
     joints, n = len(late), moves.shape[2]
+    p, shown, work = np.zeros((n, n)), np.zeros((n, joints)), np.zeros((n, n))
     for r in range(moves.shape[1]):
-        p = np.zeros((n, n))
+        p[:] = 0.0
         for j in range(joints):
             p[j, j] = 9.0 * sensor[j]
             p[joints + j, joints + j] = 9.0 * sensor[j] / FIRST_SPAN**2 + 1.0
             p[2 * joints + j, 2 * joints + j] = 100.0
         for k in range(last[r] + 1):
-            ph = np.zeros((n, joints))
-            for j in range(joints):
-                ph[:, j] = p[:, j] - late[j] * p[:, joints + j]
-            s = np.zeros((joints, joints))
-            for i in range(joints):
-                for j in range(joints):
-                    s[i, j] = ph[i, j] - late[i] * ph[joints + i, j]
-                s[i, i] += sensor[i]
-            inverse = np.linalg.inv(s)
-            gain = ph @ inverse
-            p = p - gain @ ph.T
-            p = 0.5 * (p + p.T)
-            gains[k, r], covariance[k, r], innovation[k, r] = gain, p, inverse
+            _show(p, sensor, late, shown, innovation[k, r])
+            _invert(innovation[k, r])
+            _correct(p, shown, innovation[k, r], gains[k, r])
+            covariance[k, r] = p
             if k < last[r]:
-                dt = t[k + 1, r] - t[k, r]
-                p = moves[k + 1, r] @ p @ moves[k + 1, r].T
-                for j in range(joints):
-                    i, m = joints + j, 2 * joints + j
-                    p[j, j] += rate[j] * dt**5 / 20.0
-                    p[j, i] += rate[j] * dt**4 / 8.0
-                    p[i, j] += rate[j] * dt**4 / 8.0
-                    p[j, m] += rate[j] * dt**3 / 6.0
-                    p[m, j] += rate[j] * dt**3 / 6.0
-                    p[i, i] += rate[j] * dt**3 / 3.0
-                    p[i, m] += rate[j] * dt**2 / 2.0
-                    p[m, i] += rate[j] * dt**2 / 2.0
-                    p[m, m] += rate[j] * dt
+                _predict(p, moves[k + 1, r], work)
+                _wander(p, rate, t[k + 1, r] - t[k, r])
+
+
+@cached
+def _show(p, sensor, late, shown, innovation):
+    """Covariance of the state with what the sensors show, (n, joints), and that of what they show."""
+    joints = len(late)
+    for i in range(len(p)):
+        for j in range(joints):
+            shown[i, j] = p[i, j] - late[j] * p[i, joints + j]
+    for i in range(joints):
+        for j in range(joints):
+            innovation[i, j] = shown[i, j] - late[i] * shown[joints + i, j]
+        innovation[i, i] += sensor[i]
+
+
+@cached
+def _invert(a):
+    """Invert a positive definite matrix in place, by Gauss and Jordan without pivots."""
+    n = len(a)
+    for k in range(n):
+        pivot = 1.0 / a[k, k]
+        a[k, k] = 1.0
+        for j in range(n):
+            a[k, j] *= pivot
+        for i in range(n):
+            if i != k:
+                weight = a[i, k]
+                a[i, k] = 0.0
+                for j in range(n):
+                    a[i, j] -= weight * a[k, j]
+
+
+@cached
+def _correct(p, shown, inverse, gain):
+    """Gain of a row, and the covariance (n, n) after it."""
+    joints = len(inverse)
+    for i in range(len(p)):
+        for j in range(joints):
+            total = 0.0
+            for c in range(joints):
+                total += shown[i, c] * inverse[c, j]
+            gain[i, j] = total
+        for j in range(i + 1):
+            total = p[i, j]
+            for c in range(joints):
+                total -= gain[i, c] * shown[j, c]
+            p[i, j] = p[j, i] = total
+
+
+@cached
+def _predict(p, move, work):
+    """Covariance (n, n) after a move, which leaves the accelerations, the last third of the state, as they are."""
+    n = len(p)
+    moved = n - n // 3
+    work[:moved] = 0.0
+    work[moved:] = p[moved:]
+    for i in range(moved):
+        for c in range(n):
+            for j in range(n):
+                work[i, j] += move[i, c] * p[c, j]
+    for i in range(n):
+        for j in range(min(i + 1, moved)):
+            total = 0.0
+            for c in range(n):
+                total += work[i, c] * move[j, c]
+            p[i, j] = p[j, i] = total
+    p[moved:, moved:] = work[moved:, moved:]
+
+
+@cached
+def _wander(p, rate, dt):
+    """Add to a covariance what accelerations that wander do to the state within an interval."""
+    joints = len(rate)
+    for j in range(joints):
+        i, m = joints + j, 2 * joints + j
+        p[j, j] += rate[j] * dt**5 / 20.0
+        p[j, i] += rate[j] * dt**4 / 8.0
+        p[i, j] += rate[j] * dt**4 / 8.0
+        p[j, m] += rate[j] * dt**3 / 6.0
+        p[m, j] += rate[j] * dt**3 / 6.0
+        p[i, i] += rate[j] * dt**3 / 3.0
+        p[i, m] += rate[j] * dt**2 / 2.0
+        p[m, i] += rate[j] * dt**2 / 2.0
+        p[m, m] += rate[j] * dt
 
 
 @cached

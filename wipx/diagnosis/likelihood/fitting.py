@@ -54,7 +54,7 @@ class Fit:
         levels: What was held fixed: noise levels, or where predictions start.
         noise: Of its errors.
         white: Errors made white; of innovations, shape (R, m, K + 1), zero at rows that do not count.
-        blocks: Number of the stretch of time to which each white error belongs, shape of `white`.
+        blocks: Number of the stretch of time to which each white error belongs, from 0 on, shape of `white`.
         rows: Number of errors that count as independent.
         jacobian: Slopes of `white` by the position in the cube, and of the priors, shape (N + priors, D).
         log_likelihood: Of the recordings, with the priors', up to a constant that all hypotheses share.
@@ -146,7 +146,7 @@ class Fitter(ABC):
     @property
     @abstractmethod
     def blocks(self) -> np.ndarray:
-        """Number of the stretch of time to which each white error belongs, shape of `Fit.white`."""
+        """Number of the stretch of time to which each white error belongs, from 0 on, shape of `Fit.white`."""
 
     @property
     @abstractmethod

@@ -148,7 +148,8 @@ class ForecastFitter(Fitter):
     def blocks(self) -> np.ndarray:
         """Number of the stretch of time of every error, shape (N, H joints)."""
         number = np.floor(self.windows.starts / BLOCK).astype(np.int64) + 1_000_000 * self.windows.recording
-        return np.repeat(number[:, None], self._sampled.shape[0] * self.data.joints, axis=1)
+        dense = np.unique(number, return_inverse=True)[1]
+        return np.repeat(dense[:, None], self._sampled.shape[0] * self.data.joints, axis=1)
 
     @property
     def runs(self) -> np.ndarray:
@@ -240,10 +241,10 @@ class ForecastFitter(Fitter):
         """Sums of what predictions have (N,), over each stretch of time in which any counts."""
         return np.bincount(self._stretch, values)[np.bincount(self._stretch, self._counted) > 0]
 
-    @cached_property
+    @property
     def _stretch(self) -> np.ndarray:
         """Number of the stretch of time in which each prediction starts, shape (N,)."""
-        return np.unique(self.blocks[:, 0], return_inverse=True)[1].ravel()
+        return self.blocks[:, 0]
 
     def _held_out(self, fit: Fit) -> np.ndarray:
         """Log-likelihood of each prediction by the numbers that suit other stretches, shape (N,).

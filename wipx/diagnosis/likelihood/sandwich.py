@@ -43,8 +43,7 @@ def inflation(fit: Fit, indices: list[int]) -> float:
 
 def _scores(fit: Fit) -> np.ndarray:
     """Sum of slopes times white errors over each stretch, shape (stretches, D)."""
-    labels = np.unique(fit.blocks, return_inverse=True)[1].ravel()
-    return sums_over(labels, fit.jacobian[: fit.white.size] * fit.white.ravel()[:, None])
+    return sums_over(fit.blocks.ravel(), fit.jacobian[: fit.white.size] * fit.white.ravel()[:, None])
 
 
 def sums_over(labels: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -40,10 +40,9 @@ def scatter_of(fit: Fit, runs: np.ndarray, level: float) -> dict[int, Scatter]:
     """
     if not len(fit.hypothesis.cube):
         return {}
-    labels, block = np.unique(fit.blocks, return_inverse=True)
     jacobian, white, run = fit.jacobian[: fit.white.size], fit.white.ravel(), runs.ravel()
-    block, count = block.ravel(), int(run.max()) + 1
-    of_block = np.zeros(len(labels), dtype=np.int64)
+    block, count = fit.blocks.ravel(), int(run.max()) + 1
+    of_block = np.zeros(int(block.max()) + 1, dtype=np.int64)
     of_block[block] = run
     informed = sums_over(block, jacobian**2)
     scores = sums_over(block, jacobian * white[:, None])
@@ -54,7 +53,7 @@ def scatter_of(fit: Fit, runs: np.ndarray, level: float) -> dict[int, Scatter]:
     found = {}
     for i in np.flatnonzero(fit.free):
         seen = information[:, i] > UNSEEN
-        scatter = _scatter(shifts[seen, i], variances[seen, i], len(labels) - count, level)
+        scatter = _scatter(shifts[seen, i], variances[seen, i], len(of_block) - count, level)
         if scatter is not None:
             here = float(fit.hypothesis.cube[i])
             found[int(i)] = Scatter(scatter.deviation, max(here + scatter.low, 0.0), min(here + scatter.high, 1.0))
