@@ -50,10 +50,20 @@ def test_each_joint_is_seen_by_itself(tmp_path: Path, fresh_seed: int):
             assert found[f"{effect}.{symbol}"] == pytest.approx(value, rel=0.2)
 
 
+def test_a_counterbalance_is_a_spring_and_no_offset_beside_it(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"shoulder/spring": {"k": 0.4, "q0": -0.7}, "shoulder/coulomb": {"F_c": 0.08}}
+    found = expected_effects(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["shoulder/spring.k"] == pytest.approx(0.4, rel=0.1)
+    assert found["shoulder/spring.q0"] == pytest.approx(-0.7, rel=0.1)
+    assert found["shoulder/coulomb.F_c"] == pytest.approx(0.08, rel=0.2)
+    assert "actuator_shoulder/offset.F_0" not in found
+
+
 def test_nothing_much_is_asked_for_where_nothing_is_missing(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     found = expected_effects(model, (recorded(model, fresh_seed),))
-    sizes = {"F_c": 0.5, "F_0": 0.5, "sigma": 0.2, "J": 0.1}  # of what moves the joints
+    sizes = {"F_c": 0.5, "F_0": 0.5, "sigma": 0.2, "J": 0.1, "k": 0.5, "q0": np.inf}  # of what moves the joints
     assert all(abs(value) < 0.01 * sizes[name.rpartition(".")[2]] for name, value in found.items())
 
 
