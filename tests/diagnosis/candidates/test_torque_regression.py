@@ -60,10 +60,24 @@ def test_a_counterbalance_is_a_spring_and_no_offset_beside_it(tmp_path: Path, fr
     assert "actuator_shoulder/offset.F_0" not in found
 
 
+def test_a_link_with_another_centre_of_mass_is_felt_by_the_joints_that_carry_it(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {
+        "link_lower/com_offset": {"x": 0.0, "y": 0.03, "z": -0.02},  # along x is the axis of its joint
+        "shoulder/coulomb": {"F_c": 0.08},
+    }
+    found = expected_effects(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["link_lower/com_offset.y"] == pytest.approx(0.03, abs=0.004)
+    assert found["link_lower/com_offset.z"] == pytest.approx(-0.02, abs=0.004)
+    assert found["shoulder/coulomb.F_c"] == pytest.approx(0.08, rel=0.2)
+    assert "shoulder/spring.k" not in found or found["shoulder/spring.k"] < 0.02
+
+
 def test_nothing_much_is_asked_for_where_nothing_is_missing(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     found = expected_effects(model, (recorded(model, fresh_seed),))
     sizes = {"F_c": 0.5, "F_0": 0.5, "sigma": 0.2, "J": 0.1, "k": 0.5, "q0": np.inf}  # of what moves the joints
+    sizes |= dict.fromkeys("xyz", 0.3)  # length of a link
     assert all(abs(value) < 0.01 * sizes[name.rpartition(".")[2]] for name, value in found.items())
 
 
