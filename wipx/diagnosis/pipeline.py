@@ -14,7 +14,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.answer.answer import answered, proposed
 from wipx.diagnosis.answer.caveats import caveats
 from wipx.diagnosis.answer.suspects import asked, check_suspects
-from wipx.diagnosis.candidates.torque_regression import expected_effects
+from wipx.diagnosis.candidates.torque_regression import numbers_by_forces
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import found
 from wipx.diagnosis.decision.plausibility import check_plausible
@@ -100,8 +100,8 @@ def diagnose(
     begun = time.perf_counter()
     check_long_enough(recordings)
     halves = in_two(recordings)
-    expected = expected_effects(robot.nominal, halves) if robot.nominal.plant.tree is not None else {}
-    setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves), expected=expected)
+    by_forces = numbers_by_forces(robot.nominal, halves) if robot.nominal.plant.tree is not None else {}
+    setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves), by_forces=by_forces)
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
     context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)

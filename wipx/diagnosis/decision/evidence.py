@@ -47,10 +47,12 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
         search: The search by innovations.
         chosen: What it chose.
     """
-    doubted = context.setting.doubted(context.rules.forecasts.undeclared)
-    fitter = ForecastFitter(context.by_row, context.first_levels, chosen.fit.levels, doubted)
+    fitter = _forecasting(context, chosen.fit)
     if context.data.plant.tree is not None and fitter.is_possible and not _holds(context, chosen.fit):
-        return _by_forecasts(context, fitter, chosen.fit)[0]  # laws of an arm hold nearly at best: that decides alone
+        # Laws of an arm hold nearly at best: forecasts decide alone. They would take forces for noise that do not suit
+        # the motion: what makes the joints heavier then predicts better. So what the forces themselves say counts too.
+        context = replace(context, setting=replace(context.setting, forces_count=True))
+        return _by_forecasts(context, _forecasting(context, chosen.fit), chosen.fit)[0]
     context = context.trusting(chosen.fit)
     rest, shapes = decided(context, search, chosen)
     by_row = Found(context, search, rest, shapes)
@@ -65,6 +67,12 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
     exact = bool(rest.fit.effects) and context.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
     return by_row if agrees or exact else ahead
+
+
+def _forecasting(context: Context, chosen: Fit) -> ForecastFitter:
+    """Forecasts as evidence, with doubt in the robot's numbers."""
+    doubted = context.setting.doubted(context.rules.forecasts.undeclared)
+    return ForecastFitter(context.by_row, context.first_levels, chosen.levels, doubted)
 
 
 def _holds(context: Context, fit: Fit) -> bool:

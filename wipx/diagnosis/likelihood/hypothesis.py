@@ -6,11 +6,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wipx.core.model import Model
-from wipx.core.parameters import Scales
+from wipx.core.parameters import FreeParameter, Scales
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace, parameter_space
 
 GIVEN = ("gravity",)  # numbers that are exact
+
+
+@dataclass(frozen=True)
+class ByForces:
+    """What recorded forces say of a number of an effect.
+
+    Attributes:
+        value: The number [SI].
+        deviation: Its standard deviation [SI].
+        asked: Whether they ask for the effect.
+    """
+
+    value: float
+    deviation: float
+    asked: bool
 
 
 @dataclass(frozen=True)
@@ -22,18 +37,25 @@ class Setting:
         uncertainty: Relative standard deviation of nominal numbers that are not exact.
         scales: Characteristic sizes by site.
         sites: Where effects are looked for; None for everywhere.
-        expected: Numbers, by "site/kind.symbol" [SI], of effects that recorded forces ask for.
+        by_forces: What recorded forces say of numbers of effects, by "site/kind.symbol".
+        forces_count: Whether that is the prior of these numbers.
     """
 
     nominal: Model
     uncertainty: Mapping[str, float]
     scales: Mapping[str, Scales]
     sites: frozenset[str] | None = None
-    expected: Mapping[str, float] = field(default_factory=dict)
+    by_forces: Mapping[str, ByForces] = field(default_factory=dict)
+    forces_count: bool = False
+
+    @property
+    def asked_for(self) -> dict[str, float]:
+        """Numbers of the effects that recorded forces ask for, by "site/kind.symbol" [SI]."""
+        return {name: number.value for name, number in self.by_forces.items() if number.asked}
 
     def expects(self, effect: str) -> bool:
         """Whether recorded forces ask for an effect "site/kind"."""
-        return any(name.rpartition(".")[0] == effect for name in self.expected)
+        return any(name.rpartition(".")[0] == effect for name in self.asked_for)
 
     def looks_at(self, effect: str) -> bool:
         """Whether an effect "site/kind" is looked for."""
@@ -45,7 +67,17 @@ class Setting:
         prepared = self.nominal.with_effects({name: effect_of(name, plant).neutral for name in effects})
         if not effects and not self.uncertainty:
             return ParameterSpace(prepared, ())
-        return parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
+        space = parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
+        return replace(space, free=tuple(map(self._by_forces, space.free))) if self.forces_count else space
+
+    def _by_forces(self, number: FreeParameter) -> FreeParameter:
+        """A number with the prior that recorded forces give it, where they do."""
+        site, symbol = number.name.partition("/")[0], number.name.rpartition(".")[2]
+        level = f"{site}/coulomb.{symbol}"  # all laws of dry friction have it
+        known = self.by_forces.get(number.name, self.by_forces.get(level))
+        if known is None or not np.isfinite(known.deviation):
+            return number
+        return replace(number, prior_mean=known.value, prior_std=known.deviation)
 
     def with_curve_of(self, hypothesis: "Hypothesis") -> "Setting":
         """The robot with the curve that stands in for what a hypothesis leaves over, where it has one."""

@@ -177,7 +177,7 @@ class RobotSearch(Search):
 
     def _begun(self) -> Fit:
         """The fit of the effects that recorded forces ask for; the nominal model's where these do not gain enough."""
-        fitter, expected = self.store.fitter, self.store.setting.expected
+        fitter, expected = self.store.fitter, self.store.setting.asked_for
         effects = tuple(dict.fromkeys(name.rpartition(".")[0] for name in expected))
         if not effects:
             return self.nominal
