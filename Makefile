@@ -7,7 +7,7 @@ PROFILE ?= quick
 SUFFIX := $(if $(filter full,$(PROFILE)),_full)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo hardware-demo real consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control tables dashboard test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
+.PHONY: help setup demo hardware-demo real arms consistency blind concealed dirty ablation-optim table-optim fig-trajectories fig-friction fig-margins table-methods table-estimators table-control tables dashboard test test-fresh test-slow test-kill test-launchers test-bounds check docs bench lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -32,6 +32,9 @@ hardware-demo: $(READY)  ## an emulated robot on a CAN bus: record, diagnose, fi
 real: $(READY)  ## diagnose public recordings of real robots blind: the table of docs/real_recordings.md and README's picture
 	$(PY) -m wipx +experiment=real_recordings task.page=docs/real_recordings.md
 	cp runs/real_recordings/dfki_double/heldout.png docs/images/real_before_after.png
+
+arms: $(READY)  ## diagnose public recordings of three real arms blind: the table of docs/real_arms.md
+	$(PY) -m wipx +experiment=real_arms task.page=docs/real_arms.md
 
 consistency: $(READY)  ## diagnose every public rig from one group of runs after the other (PROFILE=full: the table of docs/real_consistency.md)
 	$(PY) -m wipx +experiment=real_consistency profile=consistency_$(PROFILE) $(if $(filter full,$(PROFILE)),task.page=docs/real_consistency.md)

@@ -157,7 +157,8 @@ def check_there(sources: Iterable[RecordingSource]) -> None:
         if source.path is None or not Path(source.place).expanduser().is_dir()
     ]
     if missing:
-        raise InputError(f"recordings are missing; get them, or set WIPX_RECORDINGS=FOLDER: {'; '.join(missing)}")
+        remedy = "get them, or set WIPX_RECORDINGS=FOLDER (of arms, WIPX_ARMS)"
+        raise InputError(f"recordings are missing; {remedy}: {'; '.join(missing)}")
 
 
 def outcome_of(job: Job, prepared: Prepared, baselines: Mapping[str, Any]) -> Outcome:
