@@ -88,6 +88,25 @@ def model_from_mapping(data: Mapping[str, object], where: str, folder: Path | No
         plant = plant_from_mapping(data, where, folder or Path())
     else:
         plant = plant_of(str(data["plant"]), f"{where}: plant")
+    return _model(plant, data, where)
+
+
+def model_of(plant: Plant, parameters: Mapping[str, float], effects: Mapping[str, Any], where: str) -> Model:
+    """A model of a plant, checked like one of a file.
+
+    Args:
+        plant: The plant.
+        parameters: As under `parameters` of a file [SI].
+        effects: Likewise, under `effects`.
+        where: Key that holds them, for messages.
+
+    Raises:
+        InputError: see `read_model`.
+    """
+    return _model(plant, {"parameters": parameters, "effects": effects}, where)
+
+
+def _model(plant: Plant, data: Mapping[str, object], where: str) -> Model:
     parameters = plant.complete(mapping_of(data, "parameters", where), f"{where}: parameters")
     listed = mapping_of(data, "effects", where)
     check_together(tuple(listed), plant, f"{where}: effects")

@@ -1,12 +1,19 @@
 """What authors published, beside what an answer names."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
+from sim.random_trees import mjcf
 
 from wipx.core.errors import InputError
 from wipx.core.model import Model
+from wipx.core.parameters import Scales
 from wipx.core.plant import plant_of
+from wipx.diagnosis.answer.suspects import check_suspects
 from wipx.proof.baseline_answers import NamedEffect
 from wipx.proof.real_machines.published import Published, counted
+from wipx.recordings.robot_file import robot_from_mapping
 
 DRY = Published(
     known={"pitch/coulomb": "F_c = 1 N m", "sensor_theta/bias": "small"},
@@ -46,6 +53,19 @@ def test_the_authors_model_changes_and_joins_the_nominal_one():
     assert dict(model.parameters) == {**nominal.parameters, "body_mass": 0.6}
     assert {name: dict(values) for name, values in model.effects.items()} == effects
     assert nominal.value("pitch/viscous.sigma") == 0.1
+
+
+def test_figures_for_a_robot_from_a_model_file_make_a_model_and_suspects(tmp_path: Path, fresh_seed: int):
+    (tmp_path / "robot.xml").write_text(mjcf(3, np.random.default_rng(fresh_seed)), encoding="utf-8")
+    nominal = robot_from_mapping({"plant": "robot", "model": "robot.xml"}, "robot.yaml", tmp_path).model
+    effect = f"{nominal.plant.joints[1]}/coulomb"
+    published = Published({effect: "F_c = 0.01"}, authors={"effects": {effect: {"F_c": 0.01}}})
+    model = published.authors_model(nominal, "task.cases.arm.authors")
+    assert model is not None
+    assert model.plant is nominal.plant
+    assert model.value(f"{effect}.F_c") == 0.01
+    scales = {site: Scales() for site in nominal.plant.sites}
+    assert check_suspects(published.suspects, nominal, scales) == {effect: {"F_c": 0.01}}
 
 
 def test_without_a_published_model_there_is_none():

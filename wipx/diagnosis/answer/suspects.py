@@ -31,7 +31,7 @@ from wipx.diagnosis.selection.fit_store import STARTS
 from wipx.diagnosis.selection.nested_laws import reduced_values, simple_law
 from wipx.diagnosis.selection.search import Search
 from wipx.effects.catalogue import check_together, effect_of, vocabulary
-from wipx.recordings.model_file import model_from_mapping
+from wipx.recordings.model_file import model_of
 from wipx.report.suspect_sentence import suspect_sentence
 
 Suspected = Mapping[str, Mapping[str, float]]
@@ -63,8 +63,7 @@ def check_suspects(
         check_together((*nominal.effects, name), plant, f"{where} and nominal model")
         complete[name] = {}
         if values:
-            suspected = {"plant": plant.kind, "parameters": nominal.parameters, "effects": {name: values}}
-            complete[name] = dict(model_from_mapping(suspected, where).effects[name])
+            complete[name] = dict(model_of(plant, nominal.parameters, {name: values}, where).effects[name])
             _check_bounds(name, effect, complete[name], scales[name.partition("/")[0]], where)
     return complete
 

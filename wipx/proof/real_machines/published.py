@@ -9,8 +9,7 @@ from typing import Any, Literal, Protocol
 
 from wipx.core.errors import unknown_name
 from wipx.core.model import Model
-from wipx.recordings.model_file import check_keys, mapping_of, model_from_mapping
-from wipx.recordings.tree_file import plant_to_mapping
+from wipx.recordings.model_file import check_keys, mapping_of, model_of
 from wipx.tasks.shared.job import Job
 
 Naming = Literal["name", "tie", "same physics", "missed"]
@@ -72,10 +71,7 @@ class Published:
         check_keys(self.authors, ("parameters", "effects"), where)
         parameters = {**nominal.parameters, **mapping_of(self.authors, "parameters", where)}
         effects = {**nominal.effects, **mapping_of(self.authors, "effects", where)}
-        plant = {"plant": nominal.plant.kind}
-        if nominal.plant.tree is not None:
-            plant |= plant_to_mapping(nominal.plant)
-        return model_from_mapping({**plant, "parameters": parameters, "effects": effects}, where)
+        return model_of(nominal.plant, parameters, effects, where)
 
     def same_physics(self, main: str) -> tuple[str, ...]:
         """Other laws for the physics of a main effect, as "site/kind"."""
