@@ -1,5 +1,6 @@
 """What recorded forces ask for: laws of each joint, whatever other joints lack."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.candidates.torque_regression import numbers_by_forces
 from wipx.recordings.robot_file import robot_from_mapping
+from wipx.recordings.source import RecordingSource
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 
@@ -17,6 +19,7 @@ ARM = """<mujoco><worldbody><body name="upper"><inertial pos="0 0 -0.2" mass="0.
 <inertial pos="0 0 -0.15" mass="0.3" diaginertia="0.004 0.004 0.0005"/><joint name="elbow" axis="1 0 0"/>
 </body></body></worldbody></mujoco>"""
 NOISE = 2e-5  # [rad]
+ARMS = Path(os.environ.get("WIPX_ARMS", Path(__file__).parents[4] / "shared" / "arms"))
 
 
 def arm(folder: Path) -> Model:
@@ -90,3 +93,14 @@ def test_what_the_owner_knows_is_not_asked_for_again(tmp_path: Path, fresh_seed:
     model = arm(tmp_path).with_effects({"shoulder/coulomb": {"F_c": 0.08}})
     found = asked_for(model, (recorded(model, fresh_seed),))
     assert "shoulder/coulomb.F_c" not in found
+
+
+def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_beside_the_counterbalance():
+    folder = ARMS / "kuka_kr300" / "visible"
+    if not folder.is_dir():
+        pytest.skip(f"{folder} is missing: recordings of real arms; WIPX_ARMS names their folder")
+    source = RecordingSource(path=str(folder))
+    found = asked_for(source.describe().model, source.load())
+    assert found["A2/coulomb.F_c"] == pytest.approx(490.0, rel=0.2)  # Weigand et al. 2021
+    assert found["A2/rotor_inertia.J"] == pytest.approx(844.0, rel=0.2)
+    assert found["A2/spring.k"] > 3000.0

@@ -98,6 +98,15 @@ def test_an_unknown_case_is_refused(program):
     assert "did you mean tue?" in answer.error
 
 
+def test_missing_arms_are_named_in_one_line(program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setenv("WIPX_ARMS", str(tmp_path / "nowhere"))
+    answer = program("+experiment=real_arms", "hydra.run.dir=out")
+    assert answer.status == 2
+    assert len(answer.error.strip().splitlines()) == 1
+    for part in ("kuka_kr300", "unseen/*.csv", "github.com/unisa-acg/inverse-dynamics-solver", "WIPX_ARMS"):
+        assert part in answer.error
+
+
 def test_missing_recordings_are_named_in_one_line_with_their_origins(
     program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ):
