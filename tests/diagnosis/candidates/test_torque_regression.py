@@ -95,6 +95,16 @@ def test_what_the_owner_knows_is_not_asked_for_again(tmp_path: Path, fresh_seed:
     assert "shoulder/coulomb.F_c" not in found
 
 
+def test_of_a_joint_at_rest_forces_say_nothing_of_its_motion(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    recording = recorded(model, fresh_seed)
+    still = {**recording.columns, "elbow": np.zeros(len(recording)), "u_elbow": np.zeros(len(recording))}
+    found = numbers_by_forces(model, (Recording("r1.csv", still),))
+    deviations = {name: number.deviation for name, number in found.items()}
+    assert np.isinf(deviations["elbow/viscous.sigma"])
+    assert np.isfinite(deviations["shoulder/viscous.sigma"])
+
+
 def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_beside_the_counterbalance():
     folder = ARMS / "kuka_kr300" / "visible"
     if not folder.is_dir():

@@ -29,6 +29,13 @@ def test_where_the_motion_says_enough_forces_only_give_the_start(setting: Settin
     assert setting.expects(VISCOUS)
 
 
+@pytest.mark.parametrize("deviation", [0.0, np.inf])
+def test_forces_that_show_nothing_of_a_number_are_no_prior(setting: Setting, deviation: float):
+    by_forces = {f"{VISCOUS}.sigma": ByForces(0.02, deviation, asked=False)}
+    space = replace(setting, by_forces=by_forces, forces_count=True).space((VISCOUS,))
+    assert space.prior_residuals(np.array([[0.5]])).size == 0
+
+
 def test_the_level_of_dry_friction_is_the_same_number_in_richer_laws(setting: Setting):
     told = replace(setting, by_forces={"translation/coulomb.F_c": ByForces(0.1, 0.02, asked=True)}, forces_count=True)
     space = told.space(("translation/presliding",))

@@ -23,6 +23,7 @@ from wipx.identify.motion import independent_rows, motions
 from wipx.identify.noise import sensor_noise
 
 SHIFT = 1e-3  # [m], over which slopes by a centre of mass are taken
+ALIKE = 1e-9  # relative, of the normal equations of columns that are nearly alike
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
 
 
@@ -210,10 +211,20 @@ def _fitted(lacking: np.ndarray, laws: Mapping[str, Law], names: list[str], befo
     sizes = lsq_linear(np.concatenate([own, beforehand]), np.concatenate([-lacking, 0.0 * sure]), (low, np.inf)).x
     left = lacking + own @ sizes
     first = np.cumsum([0, *(laws[name].count for name in names)])
-    spread = np.sqrt(noise * np.diag(np.linalg.pinv(own.T @ own + beforehand**2, hermitian=True)))
+    spread = _deviations(own.T @ own + beforehand**2, noise)
     return Fitted(
         left,
         dict(zip(names, np.split(sizes, first[1:-1]), strict=True)),
         dict(zip(names, spread[first[:-1]].tolist(), strict=True)),
         0.5 * float(np.sum((sure * sizes) ** 2)),
     )
+
+
+def _deviations(normal: np.ndarray, noise: float) -> np.ndarray:
+    """Standard deviations by the normal equations (D, D); infinite for what no row shows, shape (D,)."""
+    size = np.sqrt(np.diag(normal))
+    shown = size > 0.0
+    found = np.full(len(size), np.inf)
+    scaled = normal[np.ix_(shown, shown)] / np.outer(size[shown], size[shown])
+    found[shown] = np.sqrt(noise * np.diag(np.linalg.inv(scaled + ALIKE * np.eye(len(scaled))))) / size[shown]
+    return found

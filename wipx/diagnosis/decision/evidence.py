@@ -49,8 +49,8 @@ def found(context: Context, search: Search, chosen: Chosen) -> Found:
     """
     fitter = _forecasting(context, chosen.fit)
     if context.data.plant.tree is not None and fitter.is_possible and not _holds(context, chosen.fit):
-        # Laws of an arm hold nearly at best: forecasts decide alone. They would take forces for noise that do not suit
-        # the motion: what makes the joints heavier then predicts better. So what the forces themselves say counts too.
+        # Laws of an arm hold nearly at best: forecasts decide alone. Where forces and motion do not quite agree, they
+        # prefer joints that are too heavy for the forces to matter. So what the forces themselves say counts too.
         context = replace(context, setting=replace(context.setting, forces_count=True))
         return _by_forecasts(context, _forecasting(context, chosen.fit), chosen.fit)[0]
     context = context.trusting(chosen.fit)

@@ -75,7 +75,7 @@ class Setting:
         site, symbol = number.name.partition("/")[0], number.name.rpartition(".")[2]
         level = f"{site}/coulomb.{symbol}"  # all laws of dry friction have it
         known = self.by_forces.get(number.name, self.by_forces.get(level))
-        if known is None or not np.isfinite(known.deviation):
+        if known is None or not 0.0 < known.deviation < np.inf:
             return number
         return replace(number, prior_mean=known.value, prior_std=known.deviation)
 
