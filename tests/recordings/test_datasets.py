@@ -13,7 +13,11 @@ from wipx.recordings.source import RecordingSource
 ROOT = Path(__file__).parents[2]
 EXAMPLES = Path(os.environ.get("WIPX_EXAMPLES", ROOT / "../shared/examples"))
 RECORDINGS = Path(os.environ.get("WIPX_RECORDINGS", ROOT / "../shared/recordings"))
-PREFIX = "${oc.env:WIPX_RECORDINGS,../shared/recordings}"
+ARMS = Path(os.environ.get("WIPX_ARMS", ROOT / "../shared/arms"))
+FOLDERS = {
+    "${oc.env:WIPX_RECORDINGS,../shared/recordings}": RECORDINGS,
+    "${oc.env:WIPX_ARMS,../shared/arms}": ARMS,
+}
 SETS = [
     f"{name}/{part}"
     for name in ("nothing_missing", "one_effect", "pendulum", "two_effects")
@@ -24,13 +28,15 @@ DATASETS = sorted(path.stem for path in (ROOT / "conf/recordings").glob("*.yaml"
 
 def settings_of(dataset: str) -> dict:
     text = (ROOT / f"conf/recordings/{dataset}.yaml").read_text()
-    return yaml.safe_load(text.replace(PREFIX, str(RECORDINGS)))
+    for written, folder in FOLDERS.items():
+        text = text.replace(written, str(folder))
+    return yaml.safe_load(text)
 
 
 def source_of(dataset: str) -> RecordingSource:
     settings = settings_of(dataset)
     if not Path(settings["path"]).is_dir():
-        pytest.skip(f"{settings['path']} is not here; set WIPX_RECORDINGS")
+        pytest.skip(f"{settings['path']} is not here; set WIPX_RECORDINGS, for arms WIPX_ARMS")
     del settings["_target_"]
     return RecordingSource(**settings)
 
@@ -65,7 +71,12 @@ def test_every_dataset_names_its_class_and_origin(dataset: str):
 def test_every_dataset_describes_a_robot(dataset: str):
     settings = settings_of(dataset)
     del settings["_target_"]
-    assert RecordingSource(**settings).describe().model.parameters["gravity"] > 9.0
+    if "model" in settings["robot"]:  # a file beside the recordings
+        tree = source_of(dataset).describe().model.plant.tree
+        assert tree is not None
+        assert np.linalg.norm(tree.gravity) > 9.0
+    else:
+        assert RecordingSource(**settings).describe().model.parameters["gravity"] > 9.0
 
 
 @pytest.mark.parametrize("dataset", DATASETS)
