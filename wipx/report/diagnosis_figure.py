@@ -64,7 +64,7 @@ def _draw_before_and_after(panel: SubFigure, diagnosis: Diagnosis) -> None:
         draw_signal(axes, shown, column, diagnosis.units.get(column, ""))
     kind = "held-out" if shown.held_out else "fitted"
     rows[-1].set_xlabel(f"time [s], {kind} recording {shown.name}", color=MUTED, parse_math=False)
-    rows[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.14), ncols=3, frameon=False, borderaxespad=0.0, fontsize=9)
+    panel.legend(*rows[0].get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False, fontsize=9)
 
 
 def _draw_leading_law(panel: SubFigure, diagnosis: Diagnosis) -> None:

@@ -98,25 +98,24 @@ def test_an_unknown_case_is_refused(program):
     assert "did you mean tue?" in answer.error
 
 
-def test_missing_arms_are_named_in_one_line(program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setenv("WIPX_ARMS", str(tmp_path / "nowhere"))
-    answer = program("+experiment=real_arms", "hydra.run.dir=out")
-    assert answer.status == 2
-    assert len(answer.error.strip().splitlines()) == 1
-    for part in ("kuka_kr300", "unseen/*.csv", "github.com/unisa-acg/inverse-dynamics-solver", "WIPX_ARMS"):
-        assert part in answer.error
-
-
+@pytest.mark.parametrize(
+    ("experiment", "folder", "parts"),
+    [
+        ("real_recordings", "WIPX_RECORDINGS", ("energy_shaping_swingup.csv", "xl330_*.csv", "github.com/Rhoban/bam")),
+        ("real_arms", "WIPX_ARMS", ("kuka_kr300: visible/*.csv", "github.com/unisa-acg/inverse-dynamics-solver")),
+    ],
+)
 def test_missing_recordings_are_named_in_one_line_with_their_origins(
-    program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    program, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, experiment: str, folder: str, parts: tuple[str, ...]
 ):
-    monkeypatch.setenv("WIPX_RECORDINGS", str(tmp_path / "nowhere"))
-    answer = program("+experiment=real_recordings", "hydra.run.dir=out")
+    monkeypatch.setenv(folder, str(tmp_path / "nowhere"))
+    answer = program(f"+experiment={experiment}", "hydra.run.dir=out")
     assert answer.status == 2
     assert len(answer.error.strip().splitlines()) == 1
-    for part in ("energy_shaping_swingup.csv", "xl330_*.csv", "github.com/Rhoban/bam", "WIPX_RECORDINGS=FOLDER"):
+    for part in (*parts, f"{folder}=FOLDER"):
         assert part in answer.error
-    assert answer.error.count("github.com/pichim/Mini_Segway") == 2
+    if experiment == "real_recordings":
+        assert answer.error.count("github.com/pichim/Mini_Segway") == 2
     assert not (tmp_path / "out" / "table.md").exists()
 
 

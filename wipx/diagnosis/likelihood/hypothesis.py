@@ -73,7 +73,7 @@ class Setting:
     def _by_forces(self, number: FreeParameter) -> FreeParameter:
         """A number with the prior that recorded forces give it, where they do."""
         site, symbol = number.name.partition("/")[0], number.name.rpartition(".")[2]
-        level = f"{site}/coulomb.{symbol}"  # all laws of dry friction have it
+        level = f"{site}/coulomb.{symbol}"  # laws of dry friction share its symbol
         known = self.by_forces.get(number.name, self.by_forces.get(level))
         if known is None or not 0.0 < known.deviation < np.inf:
             return number

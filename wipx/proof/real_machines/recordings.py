@@ -157,7 +157,7 @@ def check_there(sources: Iterable[RecordingSource]) -> None:
         if source.path is None or not Path(source.place).expanduser().is_dir()
     ]
     if missing:
-        remedy = "get them, or set WIPX_RECORDINGS=FOLDER (of arms, WIPX_ARMS)"
+        remedy = "get them, or set WIPX_RECORDINGS=FOLDER (for arms WIPX_ARMS=FOLDER)"
         raise InputError(f"recordings are missing; {remedy}: {'; '.join(missing)}")
 
 
