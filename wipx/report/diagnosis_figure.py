@@ -32,7 +32,8 @@ from wipx.report.panels import (
     with_unit,
 )
 
-SIZE = (13.0, 4.6)  # inches
+SIZE = (13.0, 4.6)  # inches, at least
+OF_SIGNAL = 0.9  # inches of height for each signal, at least
 STAND_IN = "#9b4dbb"
 HEAT = LinearSegmentedColormap.from_list("excess", ["#eef1f4", "#e8893c", "#6b1d00"])
 SHOWN_CANDIDATES = 8
@@ -44,7 +45,8 @@ def draw_diagnosis(diagnosis: Diagnosis, path: Path) -> None:
     Raises:
         InputError: the file cannot be written.
     """
-    figure = Figure(figsize=SIZE, layout="constrained")
+    height = max(SIZE[1], OF_SIGNAL * len(diagnosis.fit.completed))
+    figure = Figure(figsize=(SIZE[0], height), layout="constrained")
     grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 1.0), wspace=0.03)
     _draw_before_and_after(figure.add_subfigure(grid[0, 0]), diagnosis)
     _draw_leading_law(figure.add_subfigure(grid[0, 1]), diagnosis)
