@@ -56,6 +56,7 @@ def main() -> int:
         fault; 130 interrupted.
     """
     os.environ["HYDRA_FULL_ERROR"] = "1"  # Hydra then raises its errors instead of printing them
+    os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is rendered; MuJoCo's window library would start a process
     register()
     started = time.time()
 

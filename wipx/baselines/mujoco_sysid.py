@@ -8,7 +8,6 @@ predictions do not.
 import importlib
 import io
 import logging
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -141,7 +140,6 @@ def _toolbox() -> Toolbox:
     Raises:
         InputError: they are not installed.
     """
-    os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn; its window library would start a process
     try:
         importlib.import_module("mujoco.sysid.report.defaults")  # mujoco.sysid itself hides which package it misses
         names = ("mujoco", "mujoco.sysid", "mujoco.minimize")

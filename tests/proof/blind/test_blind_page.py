@@ -86,6 +86,15 @@ def test_the_headline_tells_what_was_found_and_what_was_not(folder: RunFolder):
     assert [tile.worse for tile in page.tiles] == [False, True, False, False]
 
 
+def test_the_headline_says_why_a_robot_has_no_answer(folder: RunFolder):
+    opened = cases()
+    silent = replace(SCORES[1], answer=(), exact=False, verdict="", failure="no answer within 900 s")
+    opened[1] = replace(opened[1], scores={OURS: silent})
+    assert score_page_of(folder, opened, ACCOUNT).headline.endswith(
+        "No answer for 1 robot (case0002: no answer within 900 s)."
+    )
+
+
 def test_misses_lead_to_their_reports_false_alarms_first(folder: RunFolder):
     rows = score_page_of(folder, cases(), ACCOUNT).misses.rows
     assert [row[0] for row in rows] == [

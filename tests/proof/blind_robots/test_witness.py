@@ -57,16 +57,28 @@ def test_the_program_cannot_read_the_recordings_of_another_case(tmp_path: Path):
     other.mkdir(parents=True)
     (other / "robot.yaml").write_text("plant: wip\n")
     (other / "r1.csv").write_text("t,x,u\n0,0,0\n")
-    given = {"guarded": [str(tmp_path / "run")], "allowed": [], "log": str(tmp_path / "log.txt")}
-    watched = [
-        sys.executable,
-        "-m",
-        "wipx.proof.blind_robots.witness",
-        json.dumps(given),
-        "task=predict",
-        "tracking=none",
-    ]
-    places = [f"recordings.path='{other}'", f"hydra.run.dir='{tmp_path / 'out'}'"]
-    done = subprocess.run([*watched, *places], capture_output=True, text=True, timeout=60, check=False)
+    done, noted = watched(tmp_path, other, guarded=tmp_path / "run")
     assert done.returncode != 0
-    assert f"{REFUSED} {os.path.realpath(other)}" in (tmp_path / "log.txt").read_text()
+    assert f"{REFUSED} {os.path.realpath(other)}" in noted
+
+
+def test_a_robot_from_a_model_file_starts_no_process(tmp_path: Path):
+    robot = tmp_path / "robot"
+    robot.mkdir()
+    link = '<joint name="hinge"/><inertial pos="0 0 -0.1" mass="1" diaginertia="0.01 0.01 0.01"/>'
+    (robot / "robot.xml").write_text(f"<mujoco><worldbody><body>{link}</body></worldbody></mujoco>")
+    (robot / "robot.yaml").write_text("plant: robot\nmodel: robot.xml\n")
+    (robot / "r1.csv").write_text("t,hinge\n0,0\n0.1,0\n")
+    done, noted = watched(tmp_path, robot, guarded=tmp_path / "run")
+    assert "u_hinge" in done.stderr, done.stderr  # a column is missing: the model file was read
+    assert REFUSED not in noted
+
+
+def watched(tmp_path: Path, recordings: Path, *, guarded: Path) -> tuple[subprocess.CompletedProcess[str], str]:
+    """`task=diagnose` of some recordings under the witness, and what this noted."""
+    given = {"guarded": [str(guarded)], "allowed": [], "log": str(tmp_path / "log.txt")}
+    command = [sys.executable, "-m", "wipx.proof.blind_robots.witness", json.dumps(given), "task=diagnose"]
+    places = ["tracking=none", f"recordings.path='{recordings}'", f"hydra.run.dir='{tmp_path / 'out'}'"]
+    environment = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run([*command, *places], capture_output=True, text=True, timeout=60, check=False, env=environment)
+    return done, (tmp_path / "log.txt").read_text()

@@ -99,6 +99,7 @@ def score_page_of(folder: RunFolder, cases: Sequence[Opened], account: Account) 
 
 def _headline(scores: Sequence[CaseScore], alarms: Count) -> str:
     """What a reader should take away."""
+    failed = [one for one in scores if one.failure]
     hidden = [one for one in scores if one.truth]
     outside = [one for one in scores if one.outside is not None]
     parts = [dirty_sentence(scores)] if any(one.dirty is not None for one in scores) else []
@@ -115,6 +116,8 @@ def _headline(scores: Sequence[CaseScore], alarms: Count) -> str:
         parts.append(
             f"In {robots(flagged.total)} it was physics that the vocabulary lacks: {flagged.right} called unexplained."
         )
+    if failed:
+        parts.append(f"No answer for {robots(len(failed))} ({failed[0].case}: {failed[0].failure}).")
     return " ".join(part for part in parts if part)
 
 
