@@ -22,7 +22,6 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.rules import USUAL, Rules
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import search_of
-from wipx.diagnosis.selection.search import Chosen
 from wipx.identify.parameter_space import scales_of
 from wipx.identify.windows import check_long_enough
 from wipx.sim.analytic import AnalyticSimulator
@@ -114,9 +113,7 @@ def diagnose(
         check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     search = search_of(store, nominal, context.held_out)
-    chosen = Chosen(nominal) if context.by_forecasts_alone else search.run()
-    watcher("what is left over", 0.5)
-    end = found(context, search, chosen)
+    end = found(context, search)
     context, search, rest = end.context, end.search, end.rest
     watcher("held-out recordings", 0.75)
     answer = answered(context, search, rest, end.shapes)

@@ -93,20 +93,22 @@ class Context:
         by_row, seen = self.fitter.seen_by_row(fit)
         return not by_row.asks_for_force(seen.levels, self.setting.scales).any()
 
+    def holds_somewhere(self, fit: Fit) -> bool:
+        """Whether the laws of a fit leave some joint no error that lasts, if single rows tell anything."""
+        by_row, seen = self.fitter.seen_by_row(fit)
+        return self.cut_off is None and bool(np.any(by_row.foretold(seen) <= self.rules.trust.foretold))
+
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors, also what lasts of it, which innovations show; and that of the
-        forces which the observer asks for: white forces of spectral density q on a body of mass matrix M move it by
-        M^-1 q sqrt(t^3 / 3) in a time t.
+        The worst is first. Noise is that of the sensors, also what lasts of it, which innovations show. Random forces
+        excuse nothing: they leave innovations white.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
-        shaken = by_row.innovations_model.linear.b * seen.levels.force  # (places, joints, joints)
-        moved = np.sqrt(np.mean(np.sum(shaken**2, axis=2), axis=0) * HORIZON**3 / 3.0)
         errors = self.errors(fit)
         floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
-        noise = np.sqrt(floor**2 + moved**2 + by_row.innovation_sizes(seen) ** 2)
+        noise = np.hypot(floor, by_row.innovation_sizes(seen))
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
         rules = self.rules.trust  # noise that lasts puts a right model far off where motion is unstable, not beyond
         wrong = (times > rules.far_off * rules.distrusted) & (by_row.foretold(seen) > rules.foretold)
@@ -142,11 +144,6 @@ class Context:
     def cut_off(self) -> float | None:
         """Frequency above which no signal has any power [Hz]; None where they have: then single rows tell something."""
         return low_passed(self.recordings, self.data.plant, self.rules.trust.smoothed)
-
-    @property
-    def by_forecasts_alone(self) -> bool:
-        """Whether forecasts decide, whatever innovations say: those of an arm's low-passed signals say nothing."""
-        return self.data.plant.tree is not None and self.cut_off is not None
 
     @property
     def held_out(self) -> HeldOut:

@@ -18,7 +18,7 @@ from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.robot_search import search_of
+from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
 from wipx.diagnosis.selection.search import Chosen, Search
 
 
@@ -39,33 +39,76 @@ class Found:
     shapes: list[Shape]
 
 
-def found(context: Context, search: Search, chosen: Chosen) -> Found:
+def found(context: Context, search: Search) -> Found:
     """What is missing, by the evidence that suits the recordings.
 
     Args:
         context: The means, with innovations as evidence.
         search: The search by innovations.
-        chosen: What it chose.
     """
+    if isinstance(search, RobotSearch):
+        return _found_on_tree(context, search)
+    chosen = search.run()
+    by_row = _by_row(context, search, chosen)
     fitter = _forecasting(context, chosen.fit)
-    if context.data.plant.tree is not None and fitter.is_possible and not _holds(context, chosen.fit):
-        # Laws of an arm hold nearly at best: forecasts decide alone. Where forces and motion do not quite agree, they
-        # prefer joints that are too heavy for the forces to matter. So what the forces themselves say counts too.
-        context = replace(context, setting=replace(context.setting, forces_count=True))
-        return _by_forecasts(context, _forecasting(context, chosen.fit), chosen.fit)[0]
-    context = context.trusting(chosen.fit)
-    rest, shapes = decided(context, search, chosen)
-    by_row = Found(context, search, rest, shapes)
-    if not fitter.is_possible or (not rest.significant and context.is_trusted(rest.fit)):
+    if not fitter.is_possible or _is_settled(by_row):
         return by_row
-    ahead, agrees = _by_forecasts(context, fitter, chosen.fit)
+    return _better(by_row, fitter, *_by_forecasts(by_row.context, fitter, chosen.fit))
+
+
+def _found_on_tree(context: Context, search: RobotSearch) -> Found:
+    """What is missing of a robot of many joints.
+
+    Its joints do not all hide the same: where laws hold, they hold on some joint from the beginning. If they hold on
+    none, innovations are tried only if they hold on some beside what forecasts find.
+    """
+    begun = search.begun()
+    if not context.holds_somewhere(begun):
+        ahead = _by_forecasts_and_forces(context, begun)
+        if ahead is not None and not context.holds_somewhere(search.fit_from(ahead.rest.fit)):
+            return ahead
+    chosen = search.run(begun)
+    if not context.is_quiet(chosen.fit) or not context.holds_somewhere(chosen.fit):
+        return _by_forecasts_and_forces(context, chosen.fit) or _by_row(context, search, chosen)
+    by_row = _by_row(context, search, chosen)
+    fitter = _forecasting(by_row.context, chosen.fit)
+    if not fitter.is_possible or _is_settled(by_row):
+        return by_row
+    return _better(by_row, fitter, *_by_forecasts(by_row.context, fitter, chosen.fit))
+
+
+def _by_forecasts_and_forces(context: Context, chosen: Fit) -> Found | None:
+    """What forecasts find on an arm; None where recordings are too short for them.
+
+    Laws of an arm hold nearly at best. Where forces and motion do not quite agree, forecasts prefer joints that are too
+    heavy for the forces to matter. So what the forces themselves say counts too.
+    """
+    context = replace(context, setting=replace(context.setting, forces_count=True))
+    fitter = _forecasting(context, chosen)
+    return _by_forecasts(context, fitter, chosen)[0] if fitter.is_possible else None
+
+
+def _by_row(context: Context, search: Search, chosen: Chosen) -> Found:
+    """The answer of innovations."""
+    context = context.trusting(chosen.fit)
+    return Found(context, search, *decided(context, search, chosen))
+
+
+def _is_settled(by_row: Found) -> bool:
+    """Whether the laws that innovations name hold, and leave nothing over."""
+    return not by_row.rest.significant and by_row.context.is_trusted(by_row.rest.fit)
+
+
+def _better(by_row: Found, fitter: ForecastFitter, ahead: Found, agrees: bool) -> Found:
+    """The answer of innovations or that of forecasts."""
+    rest = by_row.rest
     if rest.significant:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row
         if ahead.rest.significant or ahead.context.is_quiet(ahead.rest.fit):
             return ahead
         return replace(ahead, rest=replace(ahead.rest, significant=True, p_value=rest.p_value))
-    exact = bool(rest.fit.effects) and context.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
+    exact = bool(rest.fit.effects) and by_row.context.is_quiet(rest.fit) and _predicts_better(by_row, ahead)
     return by_row if agrees or exact else ahead
 
 
@@ -73,11 +116,6 @@ def _forecasting(context: Context, chosen: Fit) -> ForecastFitter:
     """Forecasts as evidence, with doubt in the robot's numbers."""
     doubted = context.setting.doubted(context.rules.forecasts.undeclared)
     return ForecastFitter(context.by_row, context.first_levels, chosen.levels, doubted)
-
-
-def _holds(context: Context, fit: Fit) -> bool:
-    """Whether the laws of an arm hold row by row on some joint at least, and ask for hardly any forces but theirs."""
-    return not context.by_forecasts_alone and context.is_quiet(fit) and not context.by_row.holds_nowhere(fit)
 
 
 def _predicts_better(one: Found, other: Found) -> bool:

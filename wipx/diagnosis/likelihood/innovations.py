@@ -147,10 +147,6 @@ class InnovationFitter(Fitter):
         squares = (self.data.measured[:, :joints] - expected) ** 2 * self.data.counted[:, None]
         return np.sqrt(squares.sum(axis=(0, 2)) / max(int(self.data.counted.sum()), 1))
 
-    def holds_nowhere(self, fit: Fit) -> bool:
-        """Whether the laws of a fit leave every joint of a robot an error that lasts: at best they hold nearly."""
-        return bool(np.all(self.foretold(fit) > self.rules.trust.foretold))
-
     def escape_levels(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
         return replace(fit.levels, force=LOUDER * fit.levels.force)

@@ -21,6 +21,7 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Chosen, ConsideredEffect, History, Search
+from wipx.effects.catalogue import effect_of
 
 TRIED = 3  # weakest effects of the whole robot, without which it is fitted
 
@@ -137,7 +138,7 @@ class RobotSearch(Search):
 
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
-        whole: Fit = begin or self._begun()
+        whole: Fit = begin or self.begun()
         considered: History = ()
         waiting = self._order(whole)
         for sweep in range(self.store.fitter.sweeps):
@@ -175,15 +176,25 @@ class RobotSearch(Search):
 
         return self.store.fitter.simulator.side_by_side(searched, parts)
 
-    def _begun(self) -> Fit:
+    def begun(self) -> Fit:
         """The fit of the effects that recorded forces ask for; the nominal model's where these do not gain enough."""
-        fitter, expected = self.store.fitter, self.store.setting.asked_for
+        expected = self.store.setting.asked_for
         effects = tuple(dict.fromkeys(name.rpartition(".")[0] for name in expected))
         if not effects:
             return self.nominal
-        hypothesis = Hypothesis.of(self.store.setting, effects, {**self.nominal.hypothesis.values, **expected})
-        fit = self.store.restarted(self.store.keep(fitter.first_fit(hypothesis, self.nominal.levels)))
+        fit = self._first_fit(effects, expected)
         return fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
+
+    def fit_from(self, other: Fit) -> Fit:
+        """The fit of what another kind of evidence has found, as far as this one looks for it."""
+        fitter, plant = self.store.fitter, self.plant
+        effects = tuple(name for name in other.effects if fitter.looks_for(name, effect_of(name, plant)))
+        return self._first_fit(effects, other.hypothesis.values) if effects else self.nominal
+
+    def _first_fit(self, effects: tuple[str, ...], values: Mapping[str, float]) -> Fit:
+        """The fit of effects that were found without this search."""
+        hypothesis = Hypothesis.of(self.store.setting, effects, {**self.nominal.hypothesis.values, **values})
+        return self.store.restarted(self.store.keep(self.store.fitter.first_fit(hypothesis, self.nominal.levels)))
 
     def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
         """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
