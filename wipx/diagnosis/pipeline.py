@@ -1,7 +1,7 @@
 """The diagnosis: nominal model and recordings in, verdict, location, names, numbers and what is open out."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from wipx.diagnosis.answer.caveats import caveats
 from wipx.diagnosis.answer.suspects import asked, check_suspects
 from wipx.diagnosis.candidates.torque_regression import numbers_by_forces
 from wipx.diagnosis.decision.context import Context
-from wipx.diagnosis.decision.evidence import found
+from wipx.diagnosis.decision.evidence import Watcher, found
 from wipx.diagnosis.decision.plausibility import check_plausible
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.rules import USUAL, Rules
@@ -28,8 +28,6 @@ from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import StateFeedback
 
 SHORTEST_HALVED = 2.0  # [s]
-
-Watcher = Callable[[str, float], None]
 
 
 def in_two(recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
@@ -113,7 +111,7 @@ def diagnose(
         check_plausible(fitter, setting, nominal, first[0] if first else nominal, source)
     watcher("looking for combinations", 0.3)
     search = search_of(store, nominal, context.held_out)
-    end = found(context, search)
+    end = found(context, search, watcher)
     context, search, rest = end.context, end.search, end.rest
     watcher("held-out recordings", 0.75)
     answer = answered(context, search, rest, end.shapes)

@@ -33,8 +33,10 @@ def test_a_model_whose_misfit_looks_like_noise_that_lasts_is_not_trusted(fresh_s
     )
     assert context.is_quiet(without)  # the noise of the sensor takes it all
     assert context.unruly_joints(without) == ("translation",)
+    assert not context.holds_somewhere(without)
     assert not context.is_trusted(without)
     assert context.unruly_joints(right) == ()
+    assert context.holds_somewhere(right)
     assert context.is_trusted(right)
 
 

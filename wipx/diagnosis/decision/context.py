@@ -94,9 +94,9 @@ class Context:
         return not by_row.asks_for_force(seen.levels, self.setting.scales).any()
 
     def holds_somewhere(self, fit: Fit) -> bool:
-        """Whether the laws of a fit leave some joint no error that lasts, if single rows tell anything."""
+        """Whether the laws of a fit leave some joint no error that lasts."""
         by_row, seen = self.fitter.seen_by_row(fit)
-        return self.cut_off is None and bool(np.any(by_row.foretold(seen) <= self.rules.trust.foretold))
+        return bool(np.any(by_row.foretold(seen) <= self.rules.trust.foretold))
 
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
@@ -144,6 +144,11 @@ class Context:
     def cut_off(self) -> float | None:
         """Frequency above which no signal has any power [Hz]; None where they have: then single rows tell something."""
         return low_passed(self.recordings, self.data.plant, self.rules.trust.smoothed)
+
+    @property
+    def by_forecasts_alone(self) -> bool:
+        """Whether forecasts decide, whatever innovations say: those of an arm's low-passed signals say nothing."""
+        return self.data.plant.tree is not None and self.cut_off is not None
 
     @property
     def held_out(self) -> HeldOut:

@@ -2,11 +2,13 @@
 
 Under laws that hold, the likelihood of innovations is the most efficient evidence there is. Under laws that nearly
 hold, its noise model takes what is slow for noise, and with it the physics that decides a prediction of half a second.
-So innovations come first. The search is repeated by forecasts where the laws of the first one, with what stands in for
-what they leave over, hold only nearly (`Context.is_trusted`). If recordings are far likelier with that stand-in, half a
-second ahead, than with all that forecasts find, the first answer counts.
+So innovations come first, but for arms on which no law holds from the beginning. The search is repeated by forecasts
+where the laws of the first one, with what stands in for what they leave over, hold only nearly (`Context.is_trusted`).
+If recordings are far likelier with that stand-in, half a second ahead, than with all that forecasts find, the first
+answer counts.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +22,8 @@ from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
 from wipx.diagnosis.selection.search import Chosen, Search
+
+Watcher = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -39,45 +43,53 @@ class Found:
     shapes: list[Shape]
 
 
-def found(context: Context, search: Search) -> Found:
+def found(context: Context, search: Search, watcher: Watcher) -> Found:
     """What is missing, by the evidence that suits the recordings.
 
     Args:
         context: The means, with innovations as evidence.
         search: The search by innovations.
+        watcher: Told the stage and the share that is done.
     """
     if isinstance(search, RobotSearch):
-        return _found_on_tree(context, search)
-    chosen = search.run()
-    by_row = _by_row(context, search, chosen)
-    fitter = _forecasting(context, chosen.fit)
-    if not fitter.is_possible or _is_settled(by_row):
-        return by_row
-    return _better(by_row, fitter, *_by_forecasts(by_row.context, fitter, chosen.fit))
+        return _found_on_tree(context, search, watcher)
+    return _by_innovations(context, search, search.run(), watcher)
 
 
-def _found_on_tree(context: Context, search: RobotSearch) -> Found:
+def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
     """What is missing of a robot of many joints.
 
-    Its joints do not all hide the same: where laws hold, they hold on some joint from the beginning. If they hold on
-    none, innovations are tried only if they hold on some beside what forecasts find.
+    Its joints do not all lack the same: exact laws hold on some joint from the beginning. If they hold on none,
+    forecasts come first, and innovations are searched only if laws hold on some joint beside what forecasts find.
     """
+    if context.by_forecasts_alone:
+        chosen = Chosen(search.nominal)
+        ahead = _by_forecasts_and_forces(context, chosen.fit, watcher)
+        return ahead or _by_innovations(context, search, chosen, watcher)
     begun = search.begun()
     if not context.holds_somewhere(begun):
-        ahead = _by_forecasts_and_forces(context, begun)
+        ahead = _by_forecasts_and_forces(context, begun, watcher)
         if ahead is not None and not context.holds_somewhere(search.fit_from(ahead.rest.fit)):
             return ahead
     chosen = search.run(begun)
-    if not context.is_quiet(chosen.fit) or not context.holds_somewhere(chosen.fit):
-        return _by_forecasts_and_forces(context, chosen.fit) or _by_row(context, search, chosen)
-    by_row = _by_row(context, search, chosen)
-    fitter = _forecasting(by_row.context, chosen.fit)
-    if not fitter.is_possible or _is_settled(by_row):
+    holds = context.is_quiet(chosen.fit) and context.holds_somewhere(chosen.fit)
+    ahead = None if holds else _by_forecasts_and_forces(context, chosen.fit, watcher)
+    return ahead or _by_innovations(context, search, chosen, watcher)
+
+
+def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: Watcher) -> Found:
+    """What innovations chose, if its laws hold; else the better one of that and what forecasts find."""
+    watcher("what is left over", 0.5)
+    context = context.trusting(chosen.fit)
+    by_row = Found(context, search, *decided(context, search, chosen))
+    fitter = _forecasting(context, chosen.fit)
+    if not fitter.is_possible or (not by_row.rest.significant and context.is_trusted(by_row.rest.fit)):
         return by_row
-    return _better(by_row, fitter, *_by_forecasts(by_row.context, fitter, chosen.fit))
+    watcher("predictions of half a second", 0.6)
+    return _better(by_row, fitter, *_by_forecasts(context, fitter, chosen.fit))
 
 
-def _by_forecasts_and_forces(context: Context, chosen: Fit) -> Found | None:
+def _by_forecasts_and_forces(context: Context, chosen: Fit, watcher: Watcher) -> Found | None:
     """What forecasts find on an arm; None where recordings are too short for them.
 
     Laws of an arm hold nearly at best. Where forces and motion do not quite agree, forecasts prefer joints that are too
@@ -85,18 +97,10 @@ def _by_forecasts_and_forces(context: Context, chosen: Fit) -> Found | None:
     """
     context = replace(context, setting=replace(context.setting, forces_count=True))
     fitter = _forecasting(context, chosen)
-    return _by_forecasts(context, fitter, chosen)[0] if fitter.is_possible else None
-
-
-def _by_row(context: Context, search: Search, chosen: Chosen) -> Found:
-    """The answer of innovations."""
-    context = context.trusting(chosen.fit)
-    return Found(context, search, *decided(context, search, chosen))
-
-
-def _is_settled(by_row: Found) -> bool:
-    """Whether the laws that innovations name hold, and leave nothing over."""
-    return not by_row.rest.significant and by_row.context.is_trusted(by_row.rest.fit)
+    if not fitter.is_possible:
+        return None
+    watcher("predictions of half a second", 0.5)
+    return _by_forecasts(context, fitter, chosen)[0]
 
 
 def _better(by_row: Found, fitter: ForecastFitter, ahead: Found, agrees: bool) -> Found:
