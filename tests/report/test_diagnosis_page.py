@@ -38,7 +38,7 @@ def test_page_is_self_contained_and_shows_no_raw_missing_values(make, tmp_path):
     assert elements.tags.count("script") == 3  # data, plotly.js, the page's own
     page_words = elements.text.replace("(", " ").split()
     assert not {"nan", "NaN", "None", "inf", "null"} & set(page_words)
-    assert path.stat().st_size < 6e6
+    assert path.stat().st_size < 1.5e6
     assert list(tmp_path.iterdir()) == [path]
 
 

@@ -12,7 +12,7 @@ from report import synthetic
 
 from wipx.core.errors import InputError
 from wipx.core.results import IdentificationResult, SearchHistory
-from wipx.report.charts import MOST_TRACES, chart_data
+from wipx.report.charts import MISSING, MOST_TRACES, chart_data, rounded
 from wipx.report.page import page, write_page
 
 HOSTILE = "</script><script>alert(1)</script>"
@@ -54,7 +54,7 @@ def test_page_is_self_contained_and_small(tmp_path):
     assert "link" not in elements.tags
     assert "@import" not in elements.text
     assert elements.tags.count("script") == 3  # data, plotly.js, the page's own
-    assert path.stat().st_size < 6e6
+    assert path.stat().st_size < 1.5e6
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -111,15 +111,29 @@ def test_data_holds_what_was_recorded():
     whole = synthetic.with_trace(synthetic.trace("r.csv", held_out=True))
     packed = json.loads(seen(whole).scripts[0])["traces"][0]
     t = np.frombuffer(base64.b64decode(packed["t"]), "<f4")
-    completed = np.frombuffer(base64.b64decode(packed["signals"][0]["completed"]), "<f4")
     assert np.isclose(t[-1], whole.traces[0].t[-1])
+    signal = packed["signals"][0]
+    completed = unrounded(signal["completed"])
     assert np.isnan(completed).sum() == len(whole.traces[0].starts) - 1
+
+
+def test_series_are_rounded_to_a_share_of_their_range(fresh_seed):
+    values = np.random.default_rng(fresh_seed).normal(size=1000)
+    values[7] = np.nan
+    assert np.allclose(unrounded(rounded(values)), values, rtol=0.0, atol=1e-5 * np.ptp(values[8:]), equal_nan=True)
+    constant = np.array([2.5, np.nan, 2.5])
+    assert np.array_equal(unrounded(rounded(constant)), constant, equal_nan=True)
+
+
+def unrounded(series: dict) -> np.ndarray:
+    steps = np.frombuffer(base64.b64decode(series["steps"]), "<u2")
+    return np.where(steps == MISSING, np.nan, series["low"] + series["step"] * steps)
 
 
 def test_long_recordings_are_thinned_and_the_page_says_so():
     long = synthetic.trace("long.csv", held_out=True, rows=40_000, rate=650.0)
     html = page(synthetic.with_trace(long))
-    assert len(html) < 6e6
+    assert len(html) < 1.5e6
     assert re.search(r"Drawn with \d{4} of 40000 rows", html)
 
 
@@ -129,7 +143,7 @@ def test_many_long_recordings_stay_below_the_size_limit():
         for i in range(30)
     )
     html = page(replace(synthetic.result(synthetic.DOUBLE_PENDULUM_UNITS), traces=many))
-    assert len(html) < 6.2e6
+    assert len(html) < 1.5e6
     assert f"{30 - MOST_TRACES} more recordings are not shown" in html
 
 

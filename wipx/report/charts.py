@@ -12,7 +12,8 @@ from wipx.report.outcome import ModelComparison, SignalErrors, error_scale, judg
 from wipx.report.traces import break_at_restarts, decimate, prediction_error
 
 MOST_ROWS = 4000  # rows of one trace; more than a screen has pixels
-MOST_VALUES = 180_000  # in all charts: 1 MB of the page, beside 5 MB of plotly.js
+MOST_VALUES = 180_000  # in all charts: half a megabyte of the page, beside 0.7 of plotly.js
+MISSING = 65535  # of a rounded value that is not a number
 MOST_TRACES = 12
 
 
@@ -63,15 +64,15 @@ def _signal(result: ModelComparison, shown: Trace, column: str) -> dict:
         "errorFactor": errors.factor,
         "errorUnit": errors.unit,
         "noiseFloor": json_number(_floors(judged_fit(result), column)),
-        "recorded": packed(recorded),
-        "nominal": packed(shown.nominal[column]),
-        "completed": packed(shown.completed[column]),
+        "recorded": rounded(recorded),
+        "nominal": rounded(shown.nominal[column]),
+        "completed": rounded(shown.completed[column]),
     }
 
 
 def _command(result: ModelComparison, column: str, values: np.ndarray) -> dict:
     scale = scale_for([_largest(values)], result.units.get(column, ""))
-    return {"name": column, "factor": scale.factor, "unit": scale.unit, "values": packed(values)}
+    return {"name": column, "factor": scale.factor, "unit": scale.unit, "values": rounded(values)}
 
 
 def _caption(result: ModelComparison, trace: Trace, rows: int) -> str:
@@ -146,3 +147,13 @@ def packed(values: np.ndarray) -> str:
     """Little-endian 32-bit floats in base64: a third of the size of their decimal digits."""
     with np.errstate(over="ignore"):
         return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def rounded(values: np.ndarray) -> dict:
+    """A series in 16 bits a value: the least value, the step, and the steps above it in base64."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
+    step = (high - low) / (MISSING - 1)
+    steps = np.full(len(values), MISSING, dtype="<u2")
+    steps[np.isfinite(values)] = np.rint((finite - low) / (step or 1.0))
+    return {"low": low, "step": step, "steps": base64.b64encode(steps.tobytes()).decode("ascii")}

@@ -17,9 +17,12 @@ const isPrinting = () => root.dataset.theme === "light";
 const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 const withUnit = (name, unit) => plain(unit ? `${name} [${unit}]` : name);
 
-function unpack(text) {
-  const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  return new Float32Array(bytes.buffer);
+const bytesOf = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0)).buffer;
+const unpack = (text) => new Float32Array(bytesOf(text));
+
+function unround({ low, step, steps }) {
+  const missing = 65535;
+  return Float64Array.from(new Uint16Array(bytesOf(steps)), (n) => (n === missing ? NaN : low + n * step));
 }
 
 function axis(more) {
@@ -53,9 +56,9 @@ function recordingAt(index) {
     unpacked.set(index, {
       t: unpack(t),
       signals: signals.map((s) => ({
-        ...s, recorded: unpack(s.recorded), nominal: unpack(s.nominal), completed: unpack(s.completed),
+        ...s, recorded: unround(s.recorded), nominal: unround(s.nominal), completed: unround(s.completed),
       })),
-      commands: commands.map((c) => ({ ...c, values: unpack(c.values) })),
+      commands: commands.map((c) => ({ ...c, values: unround(c.values) })),
     });
   }
   return unpacked.get(index);
