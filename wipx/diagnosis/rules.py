@@ -86,11 +86,11 @@ class ForecastRules(EvidenceRules):
         "judgement: one false law in ten robots is what a user can live with; test: Vuong 1989, Econometrica 57(2)",
         UNLIMITED,
     )
-    matters: float = rule(
-        0.05,
-        "nats per prediction",
-        "gain of an effect below which it does not matter, however certain it is",
-        "derived: as if the error at one horizon became 5 % smaller",
+    least_removed: float = rule(
+        0.5,
+        "of the squared error that stays",
+        "what an effect removes at some joint from predictions over 0.5 s, below which it is not named",
+        "judgement: what is smaller may be a part of what no law describes",
         0.0,
     )
     undeclared: float = rule(

@@ -8,6 +8,8 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
+from wipx.diagnosis.decision.context import Context
+from wipx.diagnosis.decision.evidence import dominant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
@@ -79,6 +81,20 @@ def test_a_law_of_nearly_every_machine_is_preferred_and_needs_less_evidence(fres
     assert usual == fitter.odds_of(())
     assert usual - rare == pytest.approx(np.log(fitter.looked_at))
     assert fitter.odds_of(("translation/viscous", "actuator/dead_zone", "actuator/ripple")) == pytest.approx(2.0 * rare)
+
+
+def test_what_is_smaller_than_the_rest_is_not_named(fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    fitter = forecasts(case)
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    search = Search.of(FitStore.of(fitter, case.setting, nominal), nominal)
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    more = fitter.converged(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
+    context = Context.of(case.recordings, case.setting, SIMULATOR, fitter.rules)
+    kept = dominant(context, search, search.store.keep(more))
+    assert kept.fit.effects == friction.effects
+    assert [each.name for each in kept.considered] == ["environment/spring"]
+    assert fitter.removed(search.nominal, kept.fit) > fitter.rules.forecasts.least_removed
 
 
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):

@@ -13,12 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
+from wipx.core.diagnosis import ConsideredEffect
+from wipx.diagnosis.decision.confirmation import Rest, by_part, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
+from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
 from wipx.diagnosis.selection.search import Chosen, Search
@@ -52,8 +54,8 @@ def found(context: Context, search: Search, watcher: Watcher) -> Found:
         watcher: Told the stage and the share that is done.
     """
     if isinstance(search, RobotSearch):
-        return _found_on_tree(context, search, watcher)
-    return _by_innovations(context, search, search.run(), watcher)
+        return _with_dominant_effects(_found_on_tree(context, search, watcher))
+    return _with_dominant_effects(_by_innovations(context, search, search.run(), watcher))
 
 
 def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
@@ -131,8 +133,7 @@ def _predicts_better(one: Found, other: Found) -> bool:
 def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
     """Whether what has no name in the vocabulary predicts half a second far better than what has, in most stretches."""
     seen = fitter.seen_ahead(rest.fit)
-    numbers = len(rest.fit.hypothesis.cube) + len(rest.spread) - len(other.hypothesis.cube)
-    lead = seen.log_likelihood - other.log_likelihood - 0.5 * numbers * float(np.log(fitter.rows))
+    lead = seen.log_likelihood - other.log_likelihood - 0.5 * len(rest.spread) * float(np.log(fitter.rows))
     return fitter.separation(seen, other, lead, 1.0) > fitter.rules.answer.told_apart
 
 
@@ -163,6 +164,39 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
     ahead = ahead.trusting(best.fit)
     return Found(ahead, search, *_left_over(ahead, search.nominal, best)), agrees
+
+
+def _with_dominant_effects(end: Found) -> Found:
+    """What was found, without the effects that forecasts show to be small beside what no law describes."""
+    context, search, rest = end.context, end.search, end.rest
+    if not isinstance(context.fitter, ForecastFitter):
+        return end
+    kept = by_part(context, search, rest.fit, dominant)
+    if kept.fit is rest.fit:
+        return end
+    context = context.trusting(kept.fit)
+    left, shapes = _left_over(context, search.nominal, kept.after(rest.considered))
+    return Found(context, search, replace(left, significant=left.significant or rest.significant), shapes)
+
+
+def dominant(context: Context, search: Search, fit: Fit) -> Chosen:
+    """Without the least effects, which together remove little beside what stays.
+
+    They may be a part of what no law describes.
+    """
+    fitter = search.store.fitter
+    assert isinstance(fitter, ForecastFitter)
+    kept, considered = fit, ()
+    while kept.effects:
+        without = {effect: search.store.without(kept, effect) for effect in kept.effects}
+        removed = {effect: fitter.removed(smaller, fit) for effect, smaller in without.items()}
+        least = min(removed, key=lambda effect: removed[effect])
+        if removed[least] >= context.rules.forecasts.least_removed:
+            break
+        gain = evidence(without[least], kept)
+        considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)
+        kept = search.store.restarted(without[least])
+    return Chosen(kept, considered)
 
 
 def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:

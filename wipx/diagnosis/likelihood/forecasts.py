@@ -213,16 +213,34 @@ class ForecastFitter(Fitter):
         """Whether stretches of time agree that the larger one predicts recordings better that it was not fitted to.
 
         Vuong's test on the differences of their likelihoods (1989, Econometrica 57(2)), at a level for all effects that
-        are looked at together; likely ones were not picked from so many. In long recordings it must also matter, not
-        only be certain.
+        are looked at together; likely ones were not picked from so many.
         """
         kept = self._by_stretch(self._held_out(larger) - self._held_out(smaller))
-        count, rules = len(kept), self.rules.forecasts
         picked_from = 1 if all(map(self._is_likely, set(larger.effects) - set(smaller.effects))) else self.looked_at
-        reach = -float(ndtri(min(rules.level / picked_from, 0.5)))
-        chance = reach * float(np.sqrt(count) * np.std(kept, ddof=1))
+        reach = -float(ndtri(min(self.rules.forecasts.level / picked_from, 0.5)))
+        chance = reach * float(np.sqrt(len(kept)) * np.std(kept, ddof=1))
         least = self.rules.selection.least_gain - float(np.log(self.looked_at / picked_from))
-        return float(kept.sum()) >= max(least, chance, rules.matters * self.rows)
+        return float(kept.sum()) >= max(least, chance)
+
+    def removed(self, smaller: Fit, larger: Fit) -> float:
+        """Squared error over the longest horizon that the further effects of a fit remove at some joint, over the rest.
+
+        Args:
+            smaller: Without these effects.
+            larger: With them.
+        """
+        without, stays = (self._squared_errors(fit) for fit in (smaller, larger))
+        return float(np.max(without / stays)) - 1.0
+
+    def _squared_errors(self, fit: Fit) -> np.ndarray:
+        """Mean squared error of each joint over the longest horizon, by numbers that suit other stretches, (joints,).
+
+        In units of its noise.
+        """
+        batch = fit.hypothesis.space.batch(self._judged_by_others(fit)[0])
+        errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)[:, :, -self.data.joints :]
+        own = errors[self._part, np.arange(self.windows.count)]
+        return np.mean(own[self._counted] ** 2, axis=0)
 
     def odds_of(self, effects: tuple[str, ...]) -> float:
         """Those of picking an effect from all that are looked for, unless it is likely."""
@@ -256,21 +274,33 @@ class ForecastFitter(Fitter):
             begun = Hypothesis.of(self.doubted, fit.effects, fit.hypothesis.values)
             moved = self.fit(begun, fit.levels, steps=DOUBTS)
             cost = 0.5 * np.sum(moved.hypothesis.space.prior_residuals(moved.hypothesis.cube) ** 2)
-            self._doubts[key] = self._judged_by_others(moved) - cost * self._counted / self._counted.sum()
+            self._doubts[key] = self._judged_by_others(moved)[1] - cost * self._counted / self._counted.sum()
         return self._doubts[key]
 
-    def _judged_by_others(self, fit: Fit) -> np.ndarray:
-        """Likelihoods by steps to numbers that suit the others, each as long as these agree with it."""
-        part, count = self._stretch % PARTS, self.windows.count
-        steps = np.stack([self._by_others(fit, part == k) for k in range(PARTS)]) - fit.hypothesis.cube
-        tried = np.concatenate([fit.hypothesis.cube + share * steps for share in STEPS])
+    def _judged_by_others(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers that suit the other parts than each, and the likelihoods of its predictions by them.
+
+        A step from the fit leads there, as long as the others agree with it.
+
+        Returns:
+            cubes: Positions in the cube, shape (PARTS, D).
+            likelihoods: Shape (N,).
+        """
+        steps = np.stack([self._by_others(fit, self._part == k) for k in range(PARTS)]) - fit.hypothesis.cube
+        tried = fit.hypothesis.cube + np.concatenate([share * steps for share in (*STEPS, 0.0)])
         white = self.white_of(fit, fit.hypothesis.space.batch(tried)).reshape(len(tried), *fit.white.shape)
-        by_window = np.stack([self._likelihoods(replace(fit, white=each)) for each in (*white, fit.white)])
-        found = np.zeros(count)
+        by_window = np.stack([self._likelihoods(replace(fit, white=each)) for each in white])
+        cubes, likelihoods = np.empty_like(steps), np.zeros(self.windows.count)
         for k in range(PARTS):
-            own = by_window[[*range(k, len(tried), PARTS), -1]]
-            found[part == k] = own[np.argmax(own[:, part != k].sum(axis=1))][part == k]
-        return found
+            own = self._part == k
+            best = max(range(k, len(tried), PARTS), key=lambda i: float(by_window[i, ~own].sum()))
+            cubes[k], likelihoods[own] = tried[best], by_window[best, own]
+        return cubes, likelihoods
+
+    @property
+    def _part(self) -> np.ndarray:
+        """Number of the part to which each prediction belongs, shape (N,)."""
+        return self._stretch % PARTS
 
     def _by_others(self, fit: Fit, left_out: np.ndarray) -> np.ndarray:
         """Position in the cube that suits all predictions but some (N,), by one Gauss-Newton step, shape (D,)."""
@@ -293,8 +323,12 @@ class ForecastFitter(Fitter):
         return float(np.sum(self._held_out(fit) - self._held_out(other))) + fit.odds - other.odds
 
     def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
-        """As stretches of time agree on it (Vuong 1989): where no law holds, one predicts this better, another that."""
+        """As stretches of time agree on it (Vuong 1989): where no law holds, one predicts this better, another that.
+
+        Numbers that a fit has more than the rival cost it their penalty.
+        """
         differences = self._by_stretch(self._likelihoods(fit) - self._likelihoods(rival))
+        lead -= 0.5 * max(len(fit.hypothesis.cube) - len(rival.hypothesis.cube), 0) * float(np.log(self.rows))
         return float(max(lead, 0.0) / max(np.sqrt(len(differences)) * np.std(differences, ddof=1), 1e-12))
 
     def escape_levels(self, fit: Fit) -> PredictionStarts:
