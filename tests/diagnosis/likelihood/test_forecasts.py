@@ -11,7 +11,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import dominant
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.forecasts import ForecastFitter, condensed
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.fit_store import FitStore
@@ -150,19 +150,6 @@ def test_what_stays_is_told(fresh_seed: int):
     assert left.forces[0].site == "translation"
     assert left.forces[0].size > 0.0
     assert any(effect.name.startswith("translation/") for effect in answer.effects)
-
-
-def test_a_fast_log_is_condensed_without_losing_time_or_level(fresh_seed: int):
-    rng = np.random.default_rng(fresh_seed)
-    t = np.arange(0.0, 2.0, 0.001)
-    columns = {"t": t, "x": 3.0 * t + rng.normal(0.0, 1e-3, len(t)), "u": np.cos(t)}
-    short = condensed(Recording("fast", columns), ("u",))
-    assert 0.003 < np.median(np.diff(short.t)) < 0.006
-    assert np.std(short["x"] - 3.0 * short.t) < 0.7e-3
-    acting = [
-        np.cos(t[(t >= a - 1e-9) & (t < b - 1e-9)]).mean() for a, b in zip(short.t[:-1], short.t[1:], strict=True)
-    ]
-    np.testing.assert_allclose(short["u"][:-1], acting, atol=1e-9)
 
 
 def test_whole_predictions_of_a_fast_log_count(fresh_seed: int):
