@@ -18,7 +18,7 @@ CONTRACT = {
     "identifiability": {"weak", "next_experiment"},
 }
 ADDED = {
-    "": {"sentence", "source", "corrected", "bounds", "notes", "seconds", "combined", "suspects", "remainder"},
+    "": {"sentence", "source", "corrected", "bounds", "notes", "seconds", "combined", "suspects", "remainder", "minor"},
     "effects": {"share", "beyond_vocabulary", "rivals"},
     "location": set(),
     "fit": set(),

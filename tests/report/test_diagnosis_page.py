@@ -42,6 +42,13 @@ def test_page_is_self_contained_and_shows_no_raw_missing_values(make, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_small_laws_of_the_model_are_told_and_not_among_what_was_left_out():
+    whole = synthetic_diagnosis.mismatch()
+    told = words(replace(whole, effects=whole.effects[:1], minor=whole.effects[1:2]))
+    assert "Also in the completed model" in told
+    assert "Also in the completed model" not in words(whole)
+
+
 def test_page_of_a_mismatch_says_what_where_how_sure_and_what_next():
     text = words(synthetic_diagnosis.mismatch())
     for part in (

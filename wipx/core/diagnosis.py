@@ -424,6 +424,7 @@ class Diagnosis:
         combined: Laws that the vocabulary lacks and that explain several of the effects at once as well.
         suspects: Hypotheses that were tested after the answer was complete, and what these recordings say of them.
         remainder: What the completed model leaves; None if it was not computed.
+        minor: Effects of the completed model that are too small beside what no law describes to be named.
     """
 
     title: str
@@ -449,3 +450,4 @@ class Diagnosis:
     combined: tuple[Combined, ...] = ()
     suspects: tuple[Suspect, ...] = ()
     remainder: Remainder | None = None
+    minor: tuple[FoundEffect, ...] = ()

@@ -27,6 +27,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, object]:
         "sentence": diagnosis.sentence,
         "source": diagnosis.source,
         "effects": [_effect(effect) for effect in diagnosis.effects],
+        "minor": [_effect(effect) for effect in diagnosis.minor],
         "corrected": {
             number.name: {"nominal": float(number.nominal), **_value(number)} for number in diagnosis.corrected
         },

@@ -17,6 +17,7 @@ from wipx.report.diagnosis_rows import (
 from wipx.report.diagnosis_words import (
     PLANTS,
     VERDICTS,
+    minor_sentence,
     period_sentence,
     region_sentence,
     remainder_sentences,
@@ -63,6 +64,7 @@ def diagnosis_page(diagnosis: Diagnosis) -> str:
             "traces": shown,
             "omitted": len(diagnosis.traces) - len(shown),
             "effects": effect_rows(diagnosis),
+            "minor": minor_sentence(diagnosis),
             "suspects": suspect_rows(diagnosis),
             "sites": site_bars(diagnosis),
             "picture": _picture(diagnosis),

@@ -6,6 +6,7 @@ from wipx.report.diagnosis_words import (
     VERDICTS,
     capitalised,
     combined_sentence,
+    minor_sentence,
     nats,
     next_step,
     percent,
@@ -24,6 +25,8 @@ def summary(diagnosis: Diagnosis) -> str:
     for effect in diagnosis.effects:
         lines += _effect_lines(effect, kind)
     lines += [f"  {combined_sentence(law, kind)}" for law in diagnosis.combined]
+    if diagnosis.minor:
+        lines.append(f"  {minor_sentence(diagnosis)}")
     if diagnosis.corrected:
         corrected = ", ".join(value_in_words(number) for number in diagnosis.corrected)
         lines.append(f"  corrected: {corrected}")

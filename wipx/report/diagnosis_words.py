@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, LeftForce, NextExperiment, Period, Region
 from wipx.core.results import Estimate
-from wipx.effects.words import effect_in_words, site_in_words
+from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
 
 VERDICTS = MappingProxyType(
@@ -108,6 +108,21 @@ def tie_sentence(effect: FoundEffect, plant_kind: str) -> str:
         return ""
     others = " or ".join(effect_in_words(name, plant_kind) for name in effect.equivalent)
     return f"These recordings cannot tell {effect_in_words(effect.name, plant_kind)} from {others}."
+
+
+def minor_sentence(diagnosis: Diagnosis) -> str:
+    """What the completed model has beside the named effects; empty where there is nothing."""
+    if not diagnosis.minor:
+        return ""
+    kind = diagnosis.model.plant.kind
+    laws = [
+        f"{effect_in_words(effect.name, kind)} ({', '.join(value_in_words(number) for number in effect.parameters)})"
+        for effect in diagnosis.minor
+    ]
+    return (
+        f"Also in the completed model: {in_a_row(laws)}. Predictions hardly need "
+        f"{'it' if len(laws) == 1 else 'them'}: what is so small may be a part of what no law describes."
+    )
 
 
 def combined_sentence(law: Combined, plant_kind: str) -> str:

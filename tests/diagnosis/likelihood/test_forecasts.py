@@ -8,7 +8,6 @@ from diagnosis.recorded import SIMULATOR, Bench, bench
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.evidence import dominant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
@@ -90,8 +89,7 @@ def test_what_is_smaller_than_the_rest_is_not_named(fresh_seed: int):
     search = Search.of(FitStore.of(fitter, case.setting, nominal), nominal)
     friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
     more = fitter.converged(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
-    context = Context.of(case.recordings, case.setting, SIMULATOR, fitter.rules)
-    kept = dominant(context, search, search.store.keep(more))
+    kept = dominant(search, search.store.keep(more))
     assert kept.fit.effects == friction.effects
     assert [each.name for each in kept.considered] == ["environment/spring"]
     assert fitter.removed(search.nominal, kept.fit) > fitter.rules.forecasts.least_removed

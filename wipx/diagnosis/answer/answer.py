@@ -56,7 +56,7 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     held_out, traces = judged(judge, trusted, repeated.models, context.recordings)
     fitted, _ = judge.compare(trusted, model, context.recordings, held_out=False)
     ends = estimates(context.fitter, fit, search.nominal)
-    effects = _effects(context, search, fit, repeated, ends, shapes)
+    effects, minor = _effects(context, search, rest, repeated, ends, shapes)
     unruly = context.unruly_joints(fit)
     wrong = not context.is_quiet(fit) or context.is_worse(fit) or bool(unruly)
     left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
@@ -82,7 +82,7 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
         fit=fitted,
         held_out=held_out,
         unexplained=unexplained,
-        candidates=tuple(_in_hindsight(candidate, fit) for candidate in rest.considered),
+        candidates=tuple(_in_hindsight(candidate, effects) for candidate in rest.considered),
         bounds=bounds(search.store.candidates_for(fit), context.data.plant),
         weak=(*_weak(effects, rules.answer.wide), *_as_one(as_one, nominal.plant.kind)),
         next_experiment=None,
@@ -91,6 +91,7 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
         seconds=0.0,
         combined=as_one,
         remainder=_remainder(context, model, held_out, traces, matters=matters),
+        minor=minor,
     )
     return replace(draft, sentence=sentence(draft))
 
@@ -111,45 +112,49 @@ def _remainder(
     )
 
 
-def _in_hindsight(candidate: ConsideredEffect, fit: Fit) -> ConsideredEffect:
+def _in_hindsight(candidate: ConsideredEffect, effects: tuple[FoundEffect, ...]) -> ConsideredEffect:
     """A candidate, chosen only if it is still part of the answer."""
-    return replace(candidate, chosen=candidate.chosen and set(candidate.name.split(" + ")) <= set(fit.effects))
+    named = {effect.name for effect in effects}
+    return replace(candidate, chosen=candidate.chosen and set(candidate.name.split(" + ")) <= named)
 
 
 def _effects(
     context: Context,
     search: Search,
-    fit: Fit,
+    rest: Rest,
     repeated: Transfer,
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
-) -> tuple[FoundEffect, ...]:
+) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
+    """Effects that are named, and those too small for that."""
+
     def told(piece: tuple[Search, Fit]) -> list[FoundEffect]:
         part, own = piece
-        again = repeated if own is fit else transfer(part.store.fitter, own)
-        return _effects_of_part(context.beside(part), part, own, again, ends, shapes)
+        again = repeated if own is rest.fit else transfer(part.store.fitter, own)
+        return _effects_of_part(context.beside(part), part, replace(rest, fit=own), again, ends, shapes)
 
-    parts = context.fitter.simulator.side_by_side(told, search.split(fit))
-    found = [effect for part in parts for effect in part]
-    total = sum(effect.log_evidence_gain for effect in found) or 1.0
-    shared = [replace(effect, share=effect.log_evidence_gain / total) for effect in found]
-    return tuple(sorted(shared, key=lambda effect: -effect.log_evidence_gain))
+    parts = context.fitter.simulator.side_by_side(told, search.split(rest.fit))
+    found = sorted((effect for part in parts for effect in part), key=lambda effect: -effect.log_evidence_gain)
+    named = [effect for effect in found if effect.name not in rest.minor]
+    total = sum(effect.log_evidence_gain for effect in named) or 1.0
+    shared = tuple(replace(effect, share=effect.log_evidence_gain / total) for effect in named)
+    return shared, tuple(effect for effect in found if effect.name in rest.minor)
 
 
 def _effects_of_part(
     context: Context,
     search: Search,
-    fit: Fit,
+    rest: Rest,
     repeated: Transfer,
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> list[FoundEffect]:
-    """What is told of the effects of a part, in their order; their shares are left open."""
-    found = []
+    """What is told of the effects of a part, in their order; their shares are left open, and rivals of minor ones."""
+    found, fit = [], rest.fit
     for effect in fit.effects:
         reduced = search.store.reduced(fit, effect)
         law = effect_of(effect, context.data.plant)
-        rivals, probability = _rivals(context, search, fit, effect)
+        rivals, probability = ((), 1.0) if effect in rest.minor else _rivals(context, search, fit, effect)
         found.append(
             FoundEffect(
                 effect,

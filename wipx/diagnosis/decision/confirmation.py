@@ -1,8 +1,7 @@
 """What becomes of the effects that the selection chose: which are kept, and what stands in for what they leave over."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy.special import chdtrc
@@ -38,6 +37,7 @@ class Rest:
         resembles: Effects beyond the vocabulary that would explain it.
         spread: Standard deviation of the stand-in at its knots [force or share]; empty where there is none.
         considered: What was looked at on the way, in order.
+        minor: Effects of the fit that are too small beside what no law describes to be named.
     """
 
     fit: Fit
@@ -47,6 +47,7 @@ class Rest:
     resembles: tuple[str, ...]
     spread: np.ndarray
     considered: History = ()
+    minor: tuple[str, ...] = ()
 
     def after(self, history: History) -> "Rest":
         """The same, with what was considered before."""
@@ -59,11 +60,11 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
     Small effects that held-out predictions do not show are kept where something is left without them and nothing
     with them: what is left is then no misfit of another law.
     """
-    kept = by_part(context, search, chosen.fit, confirmed)
+    kept = confirmed_by_part(context, search, chosen.fit)
     shapes = shapes_of(context.by_row, kept.fit)
     rest = remaining(context, search, kept.fit, shapes).after(kept.considered)
     if rest.significant and len(kept.fit.effects) < len(chosen.fit.effects):
-        more = by_part(context, search, chosen.fit, partial(confirmed, small=True))
+        more = confirmed_by_part(context, search, chosen.fit, small=True)
         if set(more.fit.effects) > set(kept.fit.effects):
             whole = remaining(context, search, more.fit, shapes)
             if not whole.significant:
@@ -71,10 +72,12 @@ def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, lis
     return rest.after(chosen.considered), shapes
 
 
-def by_part(context: Context, search: Search, fit: Fit, kept: Callable[[Context, Search, Fit], Chosen]) -> Chosen:
-    """What is kept of a fit, each part of a robot judged by itself."""
+def confirmed_by_part(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
+    """Each part of a robot without its effects that are not confirmed (`confirmed`)."""
     parts = search.split(fit)
-    found = context.fitter.simulator.side_by_side(lambda piece: kept(context.beside(piece[0]), *piece), parts)
+    found = context.fitter.simulator.side_by_side(
+        lambda piece: confirmed(context.beside(piece[0]), *piece, small=small), parts
+    )
     considered = tuple(each for chosen in found for each in chosen.considered)
     if all(chosen.fit is own for chosen, (_, own) in zip(found, parts, strict=True)):
         return Chosen(fit, considered)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wipx.core.diagnosis import ConsideredEffect
-from wipx.diagnosis.decision.confirmation import Rest, by_part, decided, significant_residuals
+from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
@@ -54,8 +54,8 @@ def found(context: Context, search: Search, watcher: Watcher) -> Found:
         watcher: Told the stage and the share that is done.
     """
     if isinstance(search, RobotSearch):
-        return _with_dominant_effects(_found_on_tree(context, search, watcher))
-    return _with_dominant_effects(_by_innovations(context, search, search.run(), watcher))
+        return _with_minor_effects(_found_on_tree(context, search, watcher))
+    return _with_minor_effects(_by_innovations(context, search, search.run(), watcher))
 
 
 def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
@@ -166,20 +166,26 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     return Found(ahead, search, *_left_over(ahead, search.nominal, best)), agrees
 
 
-def _with_dominant_effects(end: Found) -> Found:
-    """What was found, without the effects that forecasts show to be small beside what no law describes."""
+def _with_minor_effects(end: Found) -> Found:
+    """What was found, where forecasts decide with those effects told that are small beside what no law describes.
+
+    They stay in the completed model, unless no other is there.
+    """
     context, search, rest = end.context, end.search, end.rest
-    if not isinstance(context.fitter, ForecastFitter):
+    if not isinstance(context.fitter, ForecastFitter) or not rest.fit.effects:
         return end
-    kept = by_part(context, search, rest.fit, dominant)
-    if kept.fit is rest.fit:
-        return end
-    context = context.trusting(kept.fit)
-    left, shapes = _left_over(context, search.nominal, kept.after(rest.considered))
+    kept = context.fitter.simulator.side_by_side(lambda piece: dominant(*piece), search.split(rest.fit))
+    considered = rest.considered + tuple(each for chosen in kept for each in chosen.considered)
+    named = {effect for chosen in kept for effect in chosen.fit.effects}
+    if named:
+        minor = tuple(effect for effect in rest.fit.effects if effect not in named)
+        return replace(end, rest=replace(rest, minor=minor, considered=considered))
+    context = context.trusting(search.nominal)
+    left, shapes = _left_over(context, search.nominal, Chosen(search.nominal, considered))
     return Found(context, search, replace(left, significant=left.significant or rest.significant), shapes)
 
 
-def dominant(context: Context, search: Search, fit: Fit) -> Chosen:
+def dominant(search: Search, fit: Fit) -> Chosen:
     """Without the least effects, which together remove little beside what stays.
 
     They may be a part of what no law describes.
@@ -191,7 +197,7 @@ def dominant(context: Context, search: Search, fit: Fit) -> Chosen:
         without = {effect: search.store.without(kept, effect) for effect in kept.effects}
         removed = {effect: fitter.removed(smaller, fit) for effect, smaller in without.items()}
         least = min(removed, key=lambda effect: removed[effect])
-        if removed[least] >= context.rules.forecasts.least_removed:
+        if removed[least] >= fitter.rules.forecasts.least_removed:
             break
         gain = evidence(without[least], kept)
         considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)
