@@ -366,7 +366,7 @@ class Suspect:
 
     Attributes:
         name: "site/kind".
-        named: Whether the answer names it.
+        named: Whether it is part of the answer.
         in_place_of: Effects of the answer in whose place it was fitted: they cannot stand beside it.
         parameters: Its numbers, if they are free, with 95 % intervals.
         log_evidence_gain: Log-likelihood that it adds then to the other effects, in nats.
@@ -376,6 +376,7 @@ class Suspect:
         loss: Nats by which the answer is better than with this effect; zero or less unless it is `in_place_of` others.
         size: Result for the suspected size; None if none was given.
         sentence: All of it in words.
+        minor: Whether it is part of the answer, but too small to be named.
     """
 
     name: str
@@ -389,6 +390,7 @@ class Suspect:
     loss: float
     size: SuspectedSize | None
     sentence: str = ""
+    minor: bool = False
 
     @property
     def supported(self) -> bool:

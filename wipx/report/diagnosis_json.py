@@ -163,7 +163,7 @@ def _suspect(suspect: Suspect) -> dict[str, object]:
     return {
         "name": suspect.name,
         "sentence": suspect.sentence,
-        "named": suspect.named,
+        "named": suspect.named and not suspect.minor,
         "in_place_of": list(suspect.in_place_of),
         "parameters": {symbol_of(number.name): _value(number) for number in suspect.parameters},
         "evidence": {

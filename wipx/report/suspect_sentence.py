@@ -28,7 +28,7 @@ def suspect_sentence(suspect: Suspect, *, unexplained: bool) -> str:
 def _free_size(suspect: Suspect) -> str:
     numbers = ", ".join(map(value_in_words, suspect.parameters))
     if suspect.named:
-        return f"named, {numbers}"
+        return f"{'in the completed model, but too small to be named' if suspect.minor else 'named'}, {numbers}"
     gain = f"gain {nats(suspect.log_evidence_gain)} nats of the {nats(suspect.required_gain)} needed"
     if suspect.supported:
         gain = f"gain {nats(suspect.log_evidence_gain)} nats, enough to be named ({nats(suspect.required_gain)} needed)"

@@ -126,6 +126,7 @@ class _Asked:
             transfers=bool(repeated.likelihoods.sum() > known.sum()),
             loss=0.0 if named else -evidence(best, free),
             size=None,
+            minor=self.name in self.rest.minor,
         )
         if values:
             limit = (
@@ -140,7 +141,7 @@ class _Asked:
         known = vocabulary(self.context.data.plant)
         site, _, kind = self.name.partition("/")
         found = []
-        for effect in self.answer.effects:
+        for effect in (*self.answer.effects, *self.answer.minor):
             other_site, _, other = effect.name.partition("/")
             excludes = other in known[self.name].excludes or kind in known[effect.name].excludes
             nested = self.name == simple_law(effect.name) or effect.name == simple_law(self.name)
