@@ -183,7 +183,7 @@ def test_what_gains_enough_is_judged_beside_its_own_size():
     )
 
 
-def suspect_with(size: SuspectedSize, *, required_gain: float = 43.0, transfers: bool = False) -> Suspect:
+def suspect_with(size: SuspectedSize | None, *, required_gain: float = 43.0, transfers: bool = False) -> Suspect:
     """A suspect whose free size is 0.21 N m, with which it gains 24 nats."""
     number = Estimate("pitch/coulomb.F_c", "N m", 0.0, 0.21, 0.15, 0.27, False, "Coulomb level")
     return Suspect("pitch/coulomb", False, (), (number,), 24.0, required_gain, -0.1, transfers, -24.0, size)
