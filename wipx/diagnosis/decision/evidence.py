@@ -192,12 +192,13 @@ def dominant(search: Search, fit: Fit) -> Chosen:
     """
     fitter = search.store.fitter
     assert isinstance(fitter, ForecastFitter)
+    stays = fitter.squared_errors(fit)
     kept, considered = fit, ()
     while kept.effects:
         without = {effect: search.store.without(kept, effect) for effect in kept.effects}
-        removed = {effect: fitter.removed(smaller, fit) for effect, smaller in without.items()}
-        least = min(removed, key=lambda effect: removed[effect])
-        if removed[least] >= fitter.rules.forecasts.least_removed:
+        grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
+        least = min(grown, key=lambda effect: grown[effect])
+        if grown[least] >= 1.0 + fitter.rules.forecasts.least_removed:
             break
         gain = evidence(without[least], kept)
         considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)

@@ -190,17 +190,7 @@ class ForecastFitter(Fitter):
         least = self.rules.selection.least_gain - float(np.log(self.looked_at / picked_from))
         return float(gains.sum()) >= max(least, reach * self.stretches.chance(gains))
 
-    def removed(self, smaller: Fit, larger: Fit) -> float:
-        """Squared error over the longest horizon that the further effects of a fit remove at some joint, over the rest.
-
-        Args:
-            smaller: Without these effects.
-            larger: With them.
-        """
-        without, stays = (self._squared_errors(fit) for fit in (smaller, larger))
-        return float(np.max(without / stays)) - 1.0
-
-    def _squared_errors(self, fit: Fit) -> np.ndarray:
+    def squared_errors(self, fit: Fit) -> np.ndarray:
         """Mean squared error of each joint over the longest horizon, by numbers that suit other stretches, (joints,).
 
         In units of its noise.
