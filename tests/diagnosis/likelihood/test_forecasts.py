@@ -11,7 +11,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.decision.evidence import dominant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search
@@ -82,7 +82,7 @@ def test_a_law_of_nearly_every_machine_is_preferred_and_needs_less_evidence(fres
     assert fitter.odds_of(("translation/viscous", "actuator/dead_zone", "actuator/ripple")) == pytest.approx(2.0 * rare)
 
 
-def test_what_is_smaller_than_the_rest_is_not_named(fresh_seed: int):
+def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
@@ -94,6 +94,8 @@ def test_what_is_smaller_than_the_rest_is_not_named(fresh_seed: int):
     assert [each.name for each in kept.considered] == ["environment/spring"]
     without, stays = (fitter.squared_errors(fit) for fit in (search.nominal, kept.fit))
     assert without[0] / stays[0] > 1.0 + fitter.rules.forecasts.least_removed
+    monkeypatch.setattr(Setting, "expects", lambda self, effect: effect == "environment/spring")
+    assert dominant(search, more).fit is more  # recorded forces show it as well
 
 
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):

@@ -188,14 +188,14 @@ def _with_minor_effects(end: Found) -> Found:
 def dominant(search: Search, fit: Fit) -> Chosen:
     """Without the least effects, which together remove little beside what stays.
 
-    They may be a part of what no law describes.
+    They may be a part of what no law describes; not so those that recorded forces show as well.
     """
-    fitter = search.store.fitter
+    fitter, setting = search.store.fitter, search.store.setting
     assert isinstance(fitter, ForecastFitter)
     stays = fitter.squared_errors(fit)
     kept, considered = fit, ()
-    while kept.effects:
-        without = {effect: search.store.without(kept, effect) for effect in kept.effects}
+    while doubtful := [effect for effect in kept.effects if not setting.expects(effect)]:
+        without = {effect: search.store.without(kept, effect) for effect in doubtful}
         grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
         least = min(grown, key=lambda effect: grown[effect])
         if grown[least] >= 1.0 + fitter.rules.forecasts.least_removed:
