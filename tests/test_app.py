@@ -14,7 +14,7 @@ from tasks.conftest import Answer, program_in
 from wipx.app import configuration_folder, explanation
 from wipx.renamed import renamed
 
-SLOW_PACKAGES = {"torch", "mlflow", "pybullet", "numba", "scipy", "matplotlib", "pandas"}
+SLOW_PACKAGES = {"torch", "mlflow", "pybullet", "numba", "scipy", "matplotlib", "plotly", "pandas"}
 REPORT_IMPORTS = f"""
 import sys
 from wipx.app import main

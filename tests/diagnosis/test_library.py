@@ -13,7 +13,7 @@ from wipx.core.errors import InputError
 from wipx.recordings.robot_file import read_robot
 from wipx.recordings.source import RecordingSource
 
-SLOW_PACKAGES = {"numba", "scipy", "matplotlib", "mlflow", "pandas", "hydra"}
+SLOW_PACKAGES = {"numba", "scipy", "matplotlib", "plotly", "mlflow", "pandas", "hydra"}
 COLUMNS = ("t", "x", "u")
 
 

@@ -147,7 +147,7 @@ def _toolbox() -> Toolbox:
     except ModuleNotFoundError as error:
         raise InputError(
             f"baseline=mujoco_sysid needs MuJoCo's toolbox ({error.name or error} is missing); "
-            'pip install "mujoco>=4.0,<5" absl-py colorama tabulate'
+            'pip install "mujoco>=4.0,<5" absl-py colorama plotly tabulate'
         ) from error
 
 
