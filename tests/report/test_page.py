@@ -125,6 +125,19 @@ def test_series_are_rounded_to_a_share_of_their_range(fresh_seed):
     assert np.array_equal(unrounded(rounded(constant)), constant, equal_nan=True)
 
 
+def test_a_prediction_that_runs_away_is_still_drawn_where_it_did_not():
+    whole = synthetic.trace("r.csv", held_out=True)
+    away = {name: values.copy() for name, values in whole.nominal.items()}
+    for values in away.values():
+        values[-1] = 1e300
+    drawn = json.loads(seen(synthetic.with_trace(replace(whole, nominal=away))).scripts[0])["traces"][0]
+    usual = json.loads(seen(synthetic.with_trace(whole)).scripts[0])["traces"][0]
+    for signal, other in zip(drawn["signals"], usual["signals"], strict=True):
+        span = np.ptp(whole.recorded[signal["name"]])
+        before, after = (unrounded(each["nominal"])[:-1] for each in (other, signal))
+        assert np.allclose(before, after, rtol=0.0, atol=1e-3 * span, equal_nan=True)
+
+
 def unrounded(series: dict) -> np.ndarray:
     steps = np.frombuffer(base64.b64decode(series["steps"]), "<u2")
     return np.where(steps == MISSING, np.nan, series["low"] + series["step"] * steps)

@@ -14,6 +14,7 @@ from wipx.report.traces import break_at_restarts, decimate, prediction_error
 MOST_ROWS = 4000  # rows of one trace; more than a screen has pixels
 MOST_VALUES = 180_000  # in all charts: half a megabyte of the page, beside 0.7 of plotly.js
 MISSING = 65535  # of a rounded value that is not a number
+FURTHEST = 3.0  # ranges of the recorded motion; what lies beyond is drawn there, outside the axes
 MOST_TRACES = 12
 
 
@@ -65,8 +66,8 @@ def _signal(result: ModelComparison, shown: Trace, column: str) -> dict:
         "errorUnit": errors.unit,
         "noiseFloor": json_number(_floors(judged_fit(result), column)),
         "recorded": rounded(recorded),
-        "nominal": rounded(shown.nominal[column]),
-        "completed": rounded(shown.completed[column]),
+        "nominal": rounded(_within_reach(shown.nominal[column], recorded)),
+        "completed": rounded(_within_reach(shown.completed[column], recorded)),
     }
 
 
@@ -147,6 +148,13 @@ def packed(values: np.ndarray) -> str:
     """Little-endian 32-bit floats in base64: a third of the size of their decimal digits."""
     with np.errstate(over="ignore"):
         return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+
+def _within_reach(predicted: np.ndarray, recorded: np.ndarray) -> np.ndarray:
+    """A prediction whose values that ran away do not take the steps of the others."""
+    low, high = np.nanmin(recorded), np.nanmax(recorded)
+    reach = FURTHEST * (high - low)
+    return np.clip(predicted, low - reach, high + reach) if reach > 0.0 else predicted
 
 
 def rounded(values: np.ndarray) -> dict:
