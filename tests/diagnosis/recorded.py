@@ -1,7 +1,7 @@
 """Recordings of robots whose missing physics is known, logged well or badly, and what a diagnosis makes of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from wipx.core.diagnosis import Diagnosis
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
@@ -77,6 +78,23 @@ def recorded(kind: str, effects: Effects, seed: int, *, count: int = 2, duration
 def bench(kind: str, effects: Effects, seed: int, *, count: int = 2, duration: float = 3.0) -> Bench:
     """A bench with such recordings."""
     return Bench(nominal_model(kind), recorded(kind, effects, seed, count=count, duration=duration), {})
+
+
+def forecasts(case: Bench) -> ForecastFitter:
+    """What fits hypotheses to predictions of half a second of the bench's recordings."""
+    doubted = case.setting.doubted(case.fitter.rules.forecasts.undeclared)
+    return ForecastFitter(case.fitter, case.quiet, case.quiet, doubted)
+
+
+def shaken(case: Bench, rng: np.random.Generator) -> Bench:
+    """The same runs under a force that wanders, as of a cable: what is recorded of the command lacks it."""
+    recordings = []
+    for r in case.recordings:
+        wander = np.zeros(len(r))
+        for k in range(1, len(r)):
+            wander[k] = 0.98 * wander[k - 1] + 0.2 * 0.15 * np.std(r["u"]) * rng.normal()
+        recordings.append(_changed(r, {"u": r["u"] + wander}))
+    return replace(case, recordings=tuple(recordings))
 
 
 def coloured(recordings: Recordings, rng: np.random.Generator) -> Recordings:

@@ -2,7 +2,20 @@
 
 import numpy as np
 import pytest
-from sim.robots import LIVELY, PARAMETERS, Effects, Forces, Motion, energy, move, reference, robot, sines
+from sim.robots import (
+    LIVELY,
+    PARAMETERS,
+    Effects,
+    Forces,
+    Motion,
+    energy,
+    move,
+    reference,
+    robot,
+    row_forces,
+    sines,
+    unit_axis,
+)
 
 from wipx.core.model import Model
 from wipx.sim.analytic import AnalyticSimulator
@@ -169,3 +182,23 @@ def test_the_work_of_the_command_is_the_gain_of_energy():
     assert e[-1] - e[0] == pytest.approx(
         work, abs=2e-3
     )  # breathing of the integrator at 1 ms, measured without command
+
+
+def test_a_sagging_drive_gives_less_later_and_under_more_load():
+    law = {"d": 0.04, "l": 0.1, "t_0": 0.2, "u_0": 0.5}
+    for command in (2.0, -2.0, 0.5):
+        motion = move(unit_axis({"actuator/sag": law}), (0.0, 0.0), ONE_SECOND, np.full(125, command))
+        middles = 0.5 * (ONE_SECOND[1:] + ONE_SECOND[:-1])
+        lost = 0.04 * (middles - 0.2) + 0.1 * (abs(command) - 0.5)
+        np.testing.assert_allclose(
+            row_forces(motion), command * (1.0 - lost), atol=1e-4
+        )  # time counts from a step's begin
+
+
+def test_an_eccentric_encoder_errs_with_every_turn():
+    law = {"s": 0.02, "c": -0.01, "n": 7.0}
+    true = move(robot("pendulum"), LIVELY["pendulum"], ONE_SECOND)
+    shown = move(robot("pendulum", {"sensor_theta/eccentricity": law}), LIVELY["pendulum"], ONE_SECOND)
+    error = (0.02 * np.sin(7.0 * true.q) - 0.01 * np.cos(7.0 * true.q)) / 7.0
+    np.testing.assert_allclose(shown.q, true.q + error, atol=1e-9)
+    np.testing.assert_allclose(shown.v, true.v, atol=1e-12)

@@ -172,6 +172,8 @@ class Effect:
             empty.
         non_smooth: Why slopes of its likelihood mislead; None where they do not.
         doubt: Relative standard deviation of its first number by what its law leaves open.
+        tolerance: What every machine has of it: standard deviations of numbers about neutral, by symbol, in multiples
+            of the joint's `wipx.core.parameters.Scales`; empty where that is nothing.
         usual: Whether nearly every machine has it, so that less evidence will do.
         outside_vocabulary: Whether contract section 3 lacks it. A diagnosis names such an effect only where those of
             the contract leave something over.
@@ -204,6 +206,7 @@ class Effect:
     scan: str = ""
     non_smooth: NonSmooth | None = None
     doubt: float = 0.0
+    tolerance: Mapping[str, float] = field(default_factory=dict)
     usual: bool = False
     outside_vocabulary: bool = False
     on_machines: Callable[[str, Plant], bool] | None = None

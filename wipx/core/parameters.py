@@ -18,6 +18,8 @@ UNITS = {
     "time": ("s", "s"),
     "moment": ("s", "s"),  # a time of the recording
     "ratio": ("1", "1"),
+    "per_time": ("1/s", "1/s"),
+    "per_force": ("1/N", "1/(N m)"),
 }
 
 
@@ -60,6 +62,8 @@ class Scales:
             "time": 1.0,
             "moment": self.duration,
             "ratio": 1.0,
+            "per_time": 1.0,
+            "per_force": 1.0 / self.force,
         }[dimension]
 
 

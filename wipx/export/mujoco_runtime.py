@@ -230,8 +230,9 @@ class Runtime:
         joints[:, R.V * W : (R.V + 1) * W] = self.v[:, None]
 
     def _show(self) -> None:
-        laws = self._laws
-        show(self._joints, ALONE, laws.on, self._past, self._t, self._lanes, self._row, self._out, 0, 1, *self._unused)
+        on, has = self._laws.on, self._laws.has
+        past, t, row = self._past, self._t, self._row
+        show(self._joints, ALONE, on, has, past, t, self._lanes, row, self._out, 0, 1, *self._unused)
 
     def _forget(self) -> None:
         """Keep the rows of the longest delay only."""

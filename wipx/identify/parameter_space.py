@@ -1,6 +1,6 @@
 """The numbers an identification may change, and the unit cube in which optimizers search."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,7 +129,7 @@ def parameter_space(
     Raises:
         InputError: a name that the model does not have, or bounds that exclude the start.
     """
-    parameters = [p for name in switched_on for p in _effect_parameters(name, model.plant, scales)]
+    parameters = [p for name in switched_on for p in effect_parameters(name, model.plant, scales)]
     taken = {p.name for p in parameters}
     known = set(model.parameters) | {f"{e}.{s}" for e, symbols in model.effects.items() for s in symbols}
     for name, deviation in {**uncertainty, **free}.items():
@@ -150,7 +150,8 @@ def parameter_space(
     return ParameterSpace(model.with_values(start), bounded)
 
 
-def _effect_parameters(name: str, plant: Plant, scales: Mapping[str, Scales]):
+def effect_parameters(name: str, plant: Plant, scales: Mapping[str, Scales]) -> Iterator[FreeParameter]:
+    """The numbers of an effect, with the intervals in which they are searched."""
     site = name.partition("/")[0]
     for p in effect_of(name, plant).parameters:
         size = scales[site].of(p.dimension)

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from wipx.core.model import ModelBatch
+from wipx.identify.sensors import true_states
 from wipx.identify.windows import Windows
 from wipx.sim.coefficients import coefficients
 from wipx.sim.rows import ON_FRICTION
@@ -80,7 +81,7 @@ class Predictor:
 
     def first_guess(self, batch: ModelBatch) -> np.ndarray:
         """States from a parabola through the first known rows, shape (2 joints, P, R)."""
-        return true_state(batch, np.repeat(self._parabola[:, None, :], batch.size, axis=1))
+        return true_states(batch, np.repeat(self._parabola[:, None, :], batch.size, axis=1))
 
     def predict(self, batch: ModelBatch, near: np.ndarray | None = None, *, floor: bool = False) -> Prediction:
         """Estimate the states of all windows and predict them.
@@ -300,20 +301,6 @@ class Settled:
     state: np.ndarray
     gain: StateGain
     cost: np.ndarray
-
-
-def true_state(batch: ModelBatch, shown: np.ndarray) -> np.ndarray:
-    """States behind what the sensors show, their bias and scale undone; shapes (2 joints, P, R)."""
-    true = shown.copy()
-    joints = len(true) // 2
-    for j, column in enumerate(batch.model.plant.coordinates):
-        effects = batch.model.effects
-        bias, scale = f"sensor_{column}/bias", f"sensor_{column}/scale"
-        if bias in effects:
-            true[j] -= batch.column(f"{bias}.b")[:, None]
-        if scale in effects:
-            true[[j, joints + j]] /= 1.0 + batch.column(f"{scale}.e")[:, None]
-    return true
 
 
 def _last_row(rows: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import linearise_along
+from wipx.identify.sensors import delays_of, scales_of, true_states
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.inputs import Inputs
@@ -169,26 +170,4 @@ class Smoother:
             for j, name in enumerate(self.plant.coordinates):
                 fit = np.polynomial.polynomial.polyfit(t[:count], recording[name][:count], min(2, count - 1))
                 shown[j, r], shown[joints + j, r] = fit[0], fit[1]
-        found = np.repeat(shown[:, None], batch.size, axis=1)
-        found[:joints] -= of_sensors(batch, "bias", "b")[..., None]
-        return found / np.tile(scales_of(batch), (2, 1))[..., None]
-
-
-def delays_of(batch: ModelBatch) -> np.ndarray:
-    """Delay of each coordinate's sensor in each of P models, shape (joints, P) [s]."""
-    return of_sensors(batch, "delay", "tau")
-
-
-def scales_of(batch: ModelBatch) -> np.ndarray:
-    """What the sensors of each of P models show of one unit, shape (joints, P)."""
-    return 1.0 + of_sensors(batch, "scale", "e")
-
-
-def of_sensors(batch: ModelBatch, kind: str, symbol: str) -> np.ndarray:
-    """A number of each coordinate's sensor in each of P models, shape (joints, P); zero where it has none."""
-    return np.stack([_column(batch, f"sensor_{name}/{kind}", symbol) for name in batch.model.plant.coordinates])
-
-
-def _column(batch: ModelBatch, effect: str, symbol: str) -> np.ndarray:
-    """A number of an effect in every model, shape (P,); zero where the effect is absent."""
-    return batch.column(f"{effect}.{symbol}") if effect in batch.model.effects else np.zeros(batch.size)
+        return true_states(batch, np.repeat(shown[:, None], batch.size, axis=1))

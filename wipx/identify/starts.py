@@ -7,7 +7,8 @@ import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.identify.kalman import Filter, Places
-from wipx.identify.smoothing import Smoother, of_sensors, scales_of
+from wipx.identify.sensors import true_states
+from wipx.identify.smoothing import Smoother
 from wipx.identify.windows import Windows
 from wipx.sim.simulator import Path
 
@@ -33,10 +34,7 @@ class Starts:
 
     def path(self, batch: ModelBatch) -> Path:
         """The true states of each of the B models that its sensors would show so."""
-        states = self.states.copy()
-        joints = states.shape[1] // 2
-        states[:, :joints] -= of_sensors(batch, "bias", "b")[..., None]
-        return Path(states / np.tile(scales_of(batch), (2, 1))[..., None], self.until)
+        return Path(true_states(batch, self.states), self.until)
 
 
 def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:

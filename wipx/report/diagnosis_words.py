@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, LeftForce, NextExperiment, Period, Region
 from wipx.core.results import Estimate
+from wipx.effects.catalogue import kind_of
 from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
 
@@ -112,17 +113,30 @@ def tie_sentence(effect: FoundEffect, plant_kind: str) -> str:
 
 def minor_sentence(diagnosis: Diagnosis) -> str:
     """What the completed model has beside the named effects; empty where there is nothing."""
-    if not diagnosis.minor:
-        return ""
     kind = diagnosis.model.plant.kind
-    laws = [
-        f"{effect_in_words(effect.name, kind)} ({', '.join(value_in_words(number) for number in effect.parameters)})"
-        for effect in diagnosis.minor
-    ]
-    return (
-        f"Also in the completed model: {in_a_row(laws)}. Predictions hardly need "
-        f"{'it' if len(laws) == 1 else 'them'}: what is so small may be a part of what no law describes."
-    )
+
+    def told(effects: list[FoundEffect]) -> str:
+        numbers = [", ".join(value_in_words(number) for number in effect.parameters) for effect in effects]
+        laws = [f"{effect_in_words(each.name, kind)} ({own})" for each, own in zip(effects, numbers, strict=True)]
+        return in_a_row(laws)
+
+    usual = [effect for effect in diagnosis.minor if kind_of(effect.name).tolerance]
+    small = [effect for effect in diagnosis.minor if effect not in usual]
+    sentences = []
+    if small:
+        them = "it" if len(small) == 1 else "them"
+        sentences.append(
+            f"Also in the completed model: {told(small)}. Predictions hardly need {them}: what is so small may be a "
+            "part of what no law describes."
+        )
+    if usual:
+        begin = ("So is" if len(usual) == 1 else "So are") if small else "Also in the completed model:"
+        them = "it" if len(usual) == 1 else "them"
+        sentences.append(
+            f"{begin} {told(usual)}. Nearly every machine has a little of {them}, and predictions are better with "
+            f"{them}."
+        )
+    return " ".join(sentences)
 
 
 def combined_sentence(law: Combined, plant_kind: str) -> str:

@@ -1,8 +1,8 @@
 """The path from the command to the force on a joint, in causal order; compiled.
 
-Delay, the loop of a position drive, offset, dead zone, gain, saturation, speed limit, back-EMF, lag, ripple, backlash.
-A drive that reports its force knows it up to the lag; ripple and backlash are mechanical. Every part is a loop over the
-lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
+Delay, the loop of a position drive, offset, dead zone, sag, gain, saturation, speed limit, back-EMF, lag, ripple,
+backlash. A drive that reports its force knows it up to the lag; ripple and backlash are mechanical. Every part is a
+loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
 """
 
 from wipx.core.law import clip, inlined, law, sign, sin_cos
@@ -81,6 +81,10 @@ def actuator_path(S, J, n, on, has, j):
     if has[j, R.ON_DEAD_ZONE]:
         for w in range(n):
             J[R.DRIVE * W + w] = dead_zone.force(J[R.DRIVE * W + w], J[R.DEAD_BAND * W + w], J[R.SPREAD * W + w])
+    if has[j, R.ON_SAG]:
+        for w in range(n):
+            lost = J[R.SAG_TIME * W + w] * S[R.TIME * W + w] + J[R.SAG_LOAD * W + w] * abs(J[R.DRIVE * W + w])
+            J[R.DRIVE * W + w] *= 1.0 - lost + J[R.SAG_NONE * W + w]
     if has[j, R.ON_GAIN]:
         for w in range(n):
             J[R.DRIVE * W + w] *= J[R.GAIN * W + w]

@@ -141,7 +141,7 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     f.has[:, R.ON_PATH] = f.has[:, list(R.PATH)].any(axis=1)
     f.has[:, R.ON_LAWS] = f.has[:, list(R.LAWS)].any(axis=1)
     f.has[:, R.ON_MEMORY] = f.has[:, list(R.MEMORY)].any(axis=1)
-    f.on[R.ON_TIME] |= f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, R.ON_REMAINDER].any()
+    f.on[R.ON_TIME] |= f.on[R.ON_DELAY] or f.on[R.ON_EVENT] or f.has[:, [R.ON_REMAINDER, R.ON_SAG]].any()
     return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 

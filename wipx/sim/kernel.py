@@ -271,7 +271,7 @@ def rollout(
         for k in range(first_row, last_row):
             if k < len(path):
                 guide(B, lanes, k, lane0, count, path, until)
-            record(B, n, on, past, t_rows, lanes, k, out, lane0, count)
+            record(B, n, on, has, past, t_rows, lanes, k, out, lane0, count)
             if follows:
                 for w in range(count):
                     counts[w] = substeps[k, lanes[0, w]]
@@ -287,7 +287,7 @@ def rollout(
                 step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)
-        record(B, n, on, past, t_rows, lanes, last_row, out, lane0, count)
+        record(B, n, on, has, past, t_rows, lanes, last_row, out, lane0, count)
         for w in range(count):
             for j in range(joints):
                 for i in range(R.STATES):

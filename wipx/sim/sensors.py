@@ -1,6 +1,6 @@
 """What the sensors show at a row of the log, the feedback computed from it, and an observer's correction; compiled."""
 
-from wipx.core.law import clip, law, maximum, minimum
+from wipx.core.law import clip, law, maximum, minimum, sin_cos
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
@@ -25,7 +25,7 @@ def interpolate(past, t_rows, window, k, j, lane, moment):
 
 
 @law
-def record(B, n, on, past, t_rows, lanes, k, out, lane0, count):
+def record(B, n, on, has, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
     joints = out.shape[1] // 2
     for j in range(joints):
@@ -39,6 +39,11 @@ def record(B, n, on, past, t_rows, lanes, k, out, lane0, count):
                 moment = t_rows[k, lanes[0, w]] - J[R.SENSOR_DELAY * W + w]
                 late = interpolate(past, t_rows, lanes[0, w], k, j, lane0 + w, moment)
                 J[R.SHOWN * W + w] = (1.0 + J[R.SCALE * W + w]) * late + J[R.BIAS * W + w]
+        if has[j, R.ON_ECCENTRICITY]:
+            for w in range(n):
+                sine, cosine = sin_cos(J[R.ECCENTRIC_NUMBER * W + w] * J[R.SHOWN * W + w])
+                error = J[R.ECCENTRIC_SINE * W + w] * sine + J[R.ECCENTRIC_COSINE * W + w] * cosine
+                J[R.SHOWN * W + w] += error / J[R.ECCENTRIC_NUMBER * W + w]
         out[k, j, lane0 : lane0 + count] = J[R.SHOWN * W : R.SHOWN * W + count]
         out[k, joints + j, lane0 : lane0 + count] = J[R.V * W : R.V * W + count]
 

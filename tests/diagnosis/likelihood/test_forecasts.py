@@ -4,36 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis.recorded import SIMULATOR, Bench, bench
+from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.decision.evidence import dominant
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
-from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
-
-
-def forecasts(case: Bench) -> ForecastFitter:
-    return ForecastFitter(
-        case.fitter, case.quiet, case.quiet, case.setting.doubted(case.fitter.rules.forecasts.undeclared)
-    )
-
-
-def shaken(case: Bench, rng: np.random.Generator) -> Bench:
-    """The same runs under a force that wanders, as of a cable: what is recorded of the command lacks it."""
-    recordings = []
-    for r in case.recordings:
-        wander = np.zeros(len(r))
-        for k in range(1, len(r)):
-            wander[k] = 0.98 * wander[k - 1] + 0.2 * 0.15 * np.std(r["u"]) * rng.normal()
-        recordings.append(Recording(r.name, {**r.columns, "u": r["u"] + wander}, r.source, r.periods))
-    return replace(case, recordings=tuple(recordings))
 
 
 def test_friction_is_found_although_the_forces_wander(fresh_seed: int):
@@ -80,22 +62,6 @@ def test_a_law_of_nearly_every_machine_is_preferred_and_needs_less_evidence(fres
     assert usual == fitter.odds_of(())
     assert usual - rare == pytest.approx(np.log(fitter.looked_at))
     assert fitter.odds_of(("translation/viscous", "actuator/dead_zone", "actuator/ripple")) == pytest.approx(2.0 * rare)
-
-
-def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
-    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
-    fitter = forecasts(case)
-    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    search = Search.of(FitStore.of(fitter, case.setting, nominal), nominal)
-    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
-    more = fitter.converged(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
-    kept = dominant(search, search.store.keep(more))
-    assert kept.fit.effects == friction.effects
-    assert [each.name for each in kept.considered] == ["environment/spring"]
-    without, stays = (fitter.squared_errors(fit) for fit in (search.nominal, kept.fit))
-    assert without[0] / stays[0] > 1.0 + fitter.rules.forecasts.least_removed
-    monkeypatch.setattr(Setting, "expects", lambda self, effect: effect == "environment/spring")
-    assert dominant(search, more).fit is more  # recorded forces show it as well
 
 
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):

@@ -71,7 +71,7 @@ def candidates_beside(
     present = set(fit.hypothesis.model.effects)
     found: list[Candidate] = []
     for name, effect in known.items():
-        wanted = fitter.looks_for(name, effect) != outside_vocabulary
+        wanted = fitter.looks_for(name, effect) != outside_vocabulary and not effect.tolerance
         if wanted and setting.looks_at(name) and not _excluded(name, effect, present, known):
             found += candidates_of_effect(fitter, setting, fit, name)
     return sorted(found, key=lambda candidate: -candidate.gain)

@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.diagnosis import ConsideredEffect
+from wipx.diagnosis.decision.completion import completed, dominant
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
-from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
 from wipx.diagnosis.selection.search import Chosen, Search
@@ -169,41 +169,29 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
 def _with_minor_effects(end: Found) -> Found:
     """What was found, where forecasts decide with those effects told that are small beside what no law describes.
 
-    They stay in the completed model, unless no other is there.
+    They stay in the completed model, unless no other is there. What every machine has a little of joins them.
     """
     context, search, rest = end.context, end.search, end.rest
-    if not isinstance(context.fitter, ForecastFitter) or not rest.fit.effects:
+    if not isinstance(context.fitter, ForecastFitter):
         return end
-    kept = context.fitter.simulator.side_by_side(lambda piece: dominant(*piece), search.split(rest.fit))
+    by_part = context.fitter.simulator.side_by_side
+    kept = by_part(lambda piece: dominant(*piece), search.split(rest.fit)) if rest.fit.effects else []
     considered = rest.considered + tuple(each for chosen in kept for each in chosen.considered)
     named = {effect for chosen in kept for effect in chosen.fit.effects}
-    if named:
-        minor = tuple(effect for effect in rest.fit.effects if effect not in named)
-        return replace(end, rest=replace(rest, minor=minor, considered=considered))
-    context = context.trusting(search.nominal)
-    left, shapes = _left_over(context, search.nominal, Chosen(search.nominal, considered))
-    return Found(context, search, replace(left, significant=left.significant or rest.significant), shapes)
-
-
-def dominant(search: Search, fit: Fit) -> Chosen:
-    """Without the least effects, which together remove little beside what stays.
-
-    They may be a part of what no law describes; not so those that recorded forces show as well.
-    """
-    fitter, setting = search.store.fitter, search.store.setting
-    assert isinstance(fitter, ForecastFitter)
-    stays = fitter.squared_errors(fit)
-    kept, considered = fit, ()
-    while doubtful := [effect for effect in kept.effects if not setting.expects(effect)]:
-        without = {effect: search.store.without(kept, effect) for effect in doubtful}
-        grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
-        least = min(grown, key=lambda effect: grown[effect])
-        if grown[least] >= 1.0 + fitter.rules.forecasts.least_removed:
-            break
-        gain = evidence(without[least], kept)
-        considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)
-        kept = search.store.restarted(without[least])
-    return Chosen(kept, considered)
+    begun = rest.fit if named else search.nominal
+    search = search.knowing(tolerances(search.store.setting, context.fitter, context.fitter.predictions, begun))
+    context = replace(context, setting=search.store.setting)
+    parts = search.split(begun)
+    better = tuple(by_part(lambda piece: completed(*piece), parts))
+    changed = any(new is not old for new, (_, old) in zip(better, parts, strict=True))
+    whole = search.joined(begun, better) if changed else begun
+    minor = tuple(effect for effect in whole.effects if effect not in named)
+    if whole is rest.fit:
+        return Found(context, search, replace(rest, minor=minor, considered=considered), end.shapes)
+    context = context.trusting(whole)
+    left, shapes = _left_over(context, search.nominal, Chosen(whole, considered))
+    left = replace(left, significant=left.significant or rest.significant, minor=minor)
+    return Found(context, search, left, shapes)
 
 
 def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:

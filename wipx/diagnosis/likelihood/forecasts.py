@@ -26,6 +26,7 @@ from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.predictions import HORIZONS, STRIDE, Predictions
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.stretches import PARTS, Stretches, step_to_others
+from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.rules import EvidenceRules, Rules
 from wipx.effects.catalogue import kind_of, vocabulary
 from wipx.identify.kalman import Filter
@@ -184,8 +185,16 @@ class ForecastFitter(Fitter):
         Vuong's test on the differences of their likelihoods (1989, Econometrica 57(2)), at a level for all effects that
         are looked at together; likely ones were not picked from so many.
         """
-        gains = self._held_out(larger) - self._held_out(smaller)
         picked_from = 1 if all(map(self._is_likely, set(larger.effects) - set(smaller.effects))) else self.looked_at
+        return self._agree_on(self._held_out(larger) - self._held_out(smaller), picked_from)
+
+    def completes(self, smaller: Fit, larger: Fit) -> bool:
+        """Whether stretches of time agree that a law which every machine follows a little belongs to the model."""
+        gains = self._judged_by_others(larger)[1] - self._judged_by_others(smaller)[1]
+        return self._agree_on(gains, 1)
+
+    def _agree_on(self, gains: np.ndarray, picked_from: int) -> bool:
+        """Whether what predictions gain, shape (N,), is no chance."""
         reach = -float(ndtri(min(self.rules.forecasts.level / picked_from, 0.5)))
         least = self.rules.selection.least_gain - float(np.log(self.looked_at / picked_from))
         return float(gains.sum()) >= max(least, reach * self.stretches.chance(gains))
@@ -220,13 +229,18 @@ class ForecastFitter(Fitter):
         """
         key = _key(fit)
         if key not in self._doubts:
-            begun = Hypothesis.of(self.doubted, fit.effects, fit.hypothesis.values)
-            moved = self.fit(begun, fit.levels, steps=DOUBTS)
+            moved = self.in_doubt(fit)
             cost = 0.5 * np.sum(moved.hypothesis.space.prior_residuals(moved.hypothesis.cube) ** 2)
             self._doubts[key] = (
                 self._judged_by_others(moved)[1] - cost * self.predictions.counted / self.predictions.counted.sum()
             )
         return self._doubts[key]
+
+    def in_doubt(self, fit: Fit) -> Fit:
+        """A fit of the same effects, beside numbers that are not exact and what every machine has a little of."""
+        small = tolerances(self.doubted, self, self.predictions, fit)
+        doubted = replace(self.doubted, tolerances=small, everywhere=True)
+        return self.fit(Hypothesis.of(doubted, fit.effects, fit.hypothesis.values), fit.levels, steps=DOUBTS)
 
     def _judged_by_others(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         """Numbers that suit the other parts than each, and the likelihoods of its predictions by them.

@@ -1,6 +1,6 @@
 """A hypothesis: the nominal model, the effects that are supposed to be missing, and what may vary."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from wipx.core.model import Model
 from wipx.core.parameters import FreeParameter, Scales
 from wipx.effects.catalogue import effect_of
-from wipx.identify.parameter_space import ParameterSpace, parameter_space
+from wipx.identify.parameter_space import ParameterSpace, effect_parameters, parameter_space
 
 GIVEN = ("gravity",)  # numbers that are exact
 
@@ -39,6 +39,8 @@ class Setting:
         sites: Where effects are looked for; None for everywhere.
         by_forces: What recorded forces say of numbers of effects, by "site/kind.symbol".
         forces_count: Whether that is the prior of these numbers.
+        tolerances: Laws that every machine follows a little, by "site/kind", with the numbers that no prior holds.
+        everywhere: Whether all of them act, beside the effects of a hypothesis.
     """
 
     nominal: Model
@@ -47,6 +49,8 @@ class Setting:
     sites: frozenset[str] | None = None
     by_forces: Mapping[str, ByForces] = field(default_factory=dict)
     forces_count: bool = False
+    tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    everywhere: bool = False
 
     @property
     def asked_for(self) -> dict[str, float]:
@@ -64,11 +68,26 @@ class Setting:
     def space(self, effects: tuple[str, ...]) -> ParameterSpace:
         """The numbers that vary when these effects are added: theirs, and the uncertain nominal ones."""
         plant = self.nominal.plant
-        prepared = self.nominal.with_effects({name: effect_of(name, plant).neutral for name in effects})
-        if not effects and not self.uncertainty:
-            return ParameterSpace(prepared, ())
-        space = parameter_space(prepared, effects, self.uncertainty, {}, {}, self.scales)
-        return replace(space, free=tuple(map(self._by_forces, space.free))) if self.forces_count else space
+        more = tuple(name for name in self.tolerances if self.everywhere and name not in self.nominal.effects)
+        small = tuple(name for name in dict.fromkeys((*effects, *more)) if name in self.tolerances)
+        own = tuple(name for name in effects if name not in small)
+        prepared = self.nominal.with_effects({name: effect_of(name, plant).neutral for name in own})
+        prepared = prepared.with_effects({n: {**effect_of(n, plant).neutral, **self.tolerances[n]} for n in small})
+        free: tuple[FreeParameter, ...] = tuple(number for name in small for number in self._small(name))
+        if own or self.uncertainty:
+            space = parameter_space(prepared, own, self.uncertainty, {}, {}, self.scales)
+            known = tuple(map(self._by_forces, space.free)) if self.forces_count else space.free
+            return replace(space, free=(*known, *free))
+        return ParameterSpace(prepared, free)
+
+    def _small(self, name: str) -> Iterator[FreeParameter]:
+        """The numbers of a law that every machine follows a little, with the prior that says so."""
+        plant, sizes = self.nominal.plant, self.scales[name.partition("/")[0]]
+        law = effect_of(name, plant)
+        for number, known in zip(effect_parameters(name, plant, self.scales), law.parameters, strict=True):
+            if known.name in law.tolerance:
+                deviation = law.tolerance[known.name] * sizes.of(known.dimension)
+                yield replace(number, start=number.neutral, prior_mean=number.neutral, prior_std=deviation)
 
     def _by_forces(self, number: FreeParameter) -> FreeParameter:
         """A number with the prior that recorded forces give it, where they do."""

@@ -11,7 +11,7 @@ from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along
-from wipx.identify.prediction import true_state
+from wipx.identify.sensors import true_states
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
 from wipx.sim.simulator import Rollouts
@@ -92,7 +92,7 @@ class InnovationsModel:
         return np.concatenate([shown.coordinates, shown.rates], axis=1)[:, :, 0]
 
     def _shown(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray) -> Rollouts:
-        start = true_state(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
+        start = true_states(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         return self.simulator.follow(
             batch,

@@ -79,6 +79,13 @@ class Predictions:
         return rows[apart]
 
     @cached_property
+    def recorded(self) -> np.ndarray:
+        """Recorded coordinates where each starts and at its horizons, shape (N, 1 + H, joints)."""
+        windows = self.windows
+        start = np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1
+        return windows.recorded[np.stack([start, *self.sampled]), :, np.arange(self.count)].swapaxes(0, 1)
+
+    @cached_property
     def counted(self) -> np.ndarray:
         """Predictions that count: whole ones, of recordings that do, shape (N,)."""
         windows = self.windows
@@ -114,7 +121,7 @@ class Predictions:
         joints, count = self.data.joints, windows.count
         found = np.empty((batch.size, count, len(sampled) * joints))
         size = max(1, LARGEST_CALL // (len(windows.inputs.t) * 4 * count))
-        recorded = windows.recorded[sampled, :, np.arange(count)]  # (H, N, joints)
+        recorded = self.recorded[:, 1:].swapaxes(0, 1)  # (H, N, joints)
         for begin in range(0, batch.size, size):
             part = np.arange(begin, min(begin + size, batch.size))
             some = ModelBatch(batch.model, batch.names, None if batch.values is None else batch.values[part])

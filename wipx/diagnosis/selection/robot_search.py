@@ -131,6 +131,10 @@ class RobotSearch(Search):
         """A search that begins at the nominal model."""
         return cls(store, Criteria(store.fitter, nominal), None, held_out)
 
+    def knowing(self, tolerances: Mapping[str, Mapping[str, float]]) -> "RobotSearch":
+        """The same with laws that every machine follows a little."""
+        return replace(super().knowing(tolerances), _known={})
+
     @property
     def plant(self) -> Plant:
         """The robot's."""
@@ -252,7 +256,7 @@ class RobotSearch(Search):
         for name, value in held.values.items():
             effect, _, symbol = name.rpartition(".")
             if effect in held.effects and effect not in own:
-                given.setdefault(effect, {})[symbol] = value
+                given.setdefault(effect, dict(whole.tolerances.get(effect, {})))[symbol] = value
         setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
         fitter = self.store.fitter.beside(setting)
         nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))

@@ -5,8 +5,9 @@ is explained already, so that what a law misses is not filled up with further ef
 and what it considered; fits are kept in a `FitStore`, and `Criteria` decide between them.
 """
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 from wipx.core.diagnosis import ConsideredEffect
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -63,6 +64,11 @@ class Search:
         first = begun.preferred(store.extensions(nominal), nominal)
         base = nominal if first is None else store.refitted_from(nominal, first)
         return cls(store, Criteria(store.fitter, base), first, held_out)
+
+    def knowing(self, tolerances: Mapping[str, Mapping[str, float]]) -> Self:
+        """The same with laws that every machine follows a little."""
+        setting = replace(self.store.setting, tolerances=tolerances)
+        return replace(self, store=replace(self.store, setting=setting))
 
     @property
     def rules(self) -> SelectionRules:

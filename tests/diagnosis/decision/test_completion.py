@@ -1,0 +1,72 @@
+"""What is named of the effects that forecasts find, and what the completed model has beside them."""
+
+import numpy as np
+import pytest
+from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
+
+from wipx.diagnosis.decision.completion import completed, dominant
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.likelihood.tolerances import tolerances
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.search import Search
+
+FRICTION = {"translation/coulomb": {"F_c": 1.0}}
+SAG = {"actuator/sag": {"d": 0.03, "l": 0.1, "t_0": 1.5, "u_0": 1.0}}
+
+
+def search_of(case: Bench) -> Search:
+    fitter = forecasts(case)
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    return Search.of(FitStore.of(fitter, case.setting, nominal), nominal)
+
+
+def _with(case: Bench, fit: Fit, effect: str) -> Hypothesis:
+    return Hypothesis.of(case.setting, (*fit.effects, effect), fit.hypothesis.values)
+
+
+def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    search, fitter = search_of(case), forecasts(case)
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    more = fitter.converged(fitter.fit(_with(case, friction, "environment/spring"), friction.levels))
+    kept = dominant(search, search.store.keep(more))
+    assert kept.fit.effects == friction.effects
+    assert [each.name for each in kept.considered] == ["environment/spring"]
+    without, stays = (fitter.squared_errors(fit) for fit in (search.nominal, kept.fit))
+    assert without[0] / stays[0] > 1.0 + fitter.rules.forecasts.least_removed
+    monkeypatch.setattr(Setting, "expects", lambda self, effect: effect == "environment/spring")
+    assert dominant(search, more).fit is more  # recorded forces show it as well
+
+
+def test_a_drive_that_sags_sags_in_the_completed_model_and_makes_it_predict_better(fresh_seed: int):
+    case = shaken(
+        bench("linear_axis", {**FRICTION, **SAG}, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed)
+    )
+    search, fitter = search_of(case), forecasts(case)
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    knowing = search.knowing(tolerances(case.setting, fitter, fitter.predictions, friction))
+    more = completed(knowing, friction)
+    assert "actuator/sag" in more.effects
+    assert more.hypothesis.values["actuator/sag.l"] == pytest.approx(0.1, abs=0.06)
+    assert fitter.squared_errors(more)[0] < fitter.squared_errors(friction)[0]
+
+
+def test_a_drive_that_does_not_sag_does_not_in_the_completed_model(fresh_seed: int):
+    case = bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0)
+    search, fitter = search_of(case), forecasts(case)
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    knowing = search.knowing(tolerances(case.setting, fitter, fitter.predictions, friction))
+    assert completed(knowing, friction) is friction
+
+
+def test_what_every_machine_has_is_in_the_model_but_not_named(fresh_seed: int):
+    case = shaken(
+        bench("linear_axis", {**FRICTION, **SAG}, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed)
+    )
+    answer = diagnose(case.recordings, KnownRobot(case.nominal, {}), SIMULATOR)
+    assert "actuator/sag" not in {effect.name for effect in answer.effects}
+    minor = {effect.name for effect in answer.minor}
+    assert minor <= set(answer.model.effects)
+    assert all(answer.held_out.completed[name] < answer.held_out.nominal[name] for name in ("x",))

@@ -1,0 +1,48 @@
+"""Which of the effects that forecasts find are named, and what else the completed model has to predict well."""
+
+import numpy as np
+
+from wipx.core.diagnosis import ConsideredEffect
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.selection.criteria import evidence
+from wipx.diagnosis.selection.search import Chosen, Search
+
+
+def dominant(search: Search, fit: Fit) -> Chosen:
+    """Without the least effects, which together remove little beside what stays.
+
+    They may be a part of what no law describes; not so those that recorded forces show as well.
+    """
+    fitter, setting = search.store.fitter, search.store.setting
+    assert isinstance(fitter, ForecastFitter)
+    stays = fitter.squared_errors(fit)
+    kept, considered = fit, ()
+    while doubtful := [effect for effect in kept.effects if not setting.expects(effect)]:
+        without = {effect: search.store.without(kept, effect) for effect in doubtful}
+        grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
+        least = min(grown, key=lambda effect: grown[effect])
+        if grown[least] >= 1.0 + fitter.rules.forecasts.least_removed:
+            break
+        gain = evidence(without[least], kept)
+        considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)
+        kept = search.store.restarted(without[least])
+    return Chosen(kept, considered)
+
+
+def completed(search: Search, fit: Fit) -> Fit:
+    """With those laws that every machine follows a little and that make predictions better."""
+    fitter, setting = search.store.fitter, search.store.setting
+    assert isinstance(fitter, ForecastFitter)
+    small = [name for name in setting.tolerances if setting.looks_at(name) and name not in fit.effects]
+    while small:
+        values = fit.hypothesis.values
+        begun = [Hypothesis.of(setting, (*fit.effects, name), values) for name in small]
+        larger = [fitter.converged(fitter.fit(each, fit.levels)) for each in begun]
+        best = max(range(len(small)), key=lambda i: larger[i].log_likelihood)
+        if not fitter.completes(fit, larger[best]):
+            break
+        fit = search.store.keep(larger[best])
+        del small[best]
+    return fit

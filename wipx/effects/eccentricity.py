@@ -1,0 +1,22 @@
+"""Eccentric encoder: its error comes back with every turn of what it sits on."""
+
+from wipx.core.effect import SENSOR_SITES, Effect
+from wipx.core.parameters import Parameter
+
+EFFECT = Effect(
+    kind="eccentricity",
+    words="eccentricity of {place}",
+    sites=SENSOR_SITES,
+    parameters=(
+        Parameter("s", "largest relative error of the rate, of the sine", "ratio", 0.0, -0.2, 0.2, 0.0),
+        Parameter("c", "largest relative error of the rate, of the cosine", "ratio", 0.0, -0.2, 0.2, 0.0),
+        Parameter("n", "periods per radian (or metre) times 2 pi", "ratio", 1.0, 0.1, 1000.0, 1.0),
+    ),
+    law="recorded = q + (s sin(n q) + c cos(n q)) / n",
+    linear_in=("s", "c"),
+    source="Ellin, Dolsak 2008, The design and application of rotary encoders, Sensor Review 28(2)",
+    outside_vocabulary=True,
+    tolerance={"s": 0.015, "c": 0.015},
+    rows={"ECCENTRIC_SINE": "s", "ECCENTRIC_COSINE": "c", "ECCENTRIC_NUMBER": "n"},
+    parts=("ECCENTRICITY",),
+)
