@@ -5,26 +5,15 @@ from dataclasses import replace
 import numpy as np
 from report import synthetic
 
-from wipx.core.diagnosis import (
-    Alternative,
-    Bound,
-    ConsideredEffect,
-    Curve,
-    Diagnosis,
-    ErrorMap,
-    Experiment,
-    FoundEffect,
-    Location,
-    NextExperiment,
-    Period,
-    Region,
-    Suspect,
-    SuspectedSize,
-    Unexplained,
-)
+from wipx.core.curve import Curve
+from wipx.core.diagnosis import Alternative, Bound, ConsideredEffect, Diagnosis, FoundEffect
+from wipx.core.location import ErrorMap, Location, Period, Region
 from wipx.core.model import Model
+from wipx.core.next_experiment import Experiment, NextExperiment
 from wipx.core.plant import plant_of
+from wipx.core.remainder import Unexplained
 from wipx.core.results import Estimate, FitErrors
+from wipx.core.suspect import Suspect, SuspectedSize
 
 UNITS = {**synthetic.UNITS, "x_dot": "m/s", "theta_dot": "rad/s"}
 BODY = {

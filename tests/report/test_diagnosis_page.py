@@ -7,8 +7,9 @@ import pytest
 from report import synthetic, synthetic_diagnosis
 from report.test_page import HOSTILE, Elements
 
-from wipx.core.diagnosis import Diagnosis, Unexplained
+from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
+from wipx.core.remainder import Unexplained
 from wipx.core.results import Estimate
 from wipx.report.diagnosis_charts import MOST_RUNS, bar_length, diagnosis_data, force_range
 from wipx.report.diagnosis_page import diagnosis_page, write_diagnosis_page

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wipx.core.diagnosis import ConsideredEffect, Curve, Diagnosis, ErrorMap
+from wipx.core.curve import Curve
+from wipx.core.diagnosis import ConsideredEffect, Diagnosis
+from wipx.core.location import ErrorMap
 from wipx.effects.words import effect_in_words, site_in_words
 from wipx.report.charts import comparison_data, json_number
 from wipx.report.diagnosis_words import capitalised

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 
-from wipx.core.diagnosis import ConsideredEffect, Diagnosis, ErrorMap
+from wipx.core.diagnosis import ConsideredEffect, Diagnosis
+from wipx.core.location import ErrorMap
 from wipx.report.diagnosis_charts import (
     TitledCurve,
     bar_length,

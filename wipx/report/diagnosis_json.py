@@ -2,18 +2,12 @@
 
 from collections.abc import Mapping
 
-from wipx.core.diagnosis import (
-    Bound,
-    Diagnosis,
-    FoundEffect,
-    Location,
-    NextExperiment,
-    Remainder,
-    Suspect,
-    SuspectedSize,
-    Unexplained,
-)
+from wipx.core.diagnosis import Bound, Diagnosis, FoundEffect
+from wipx.core.location import Location
+from wipx.core.next_experiment import NextExperiment
+from wipx.core.remainder import Remainder, Unexplained
 from wipx.core.results import Estimate, FitErrors
+from wipx.core.suspect import Suspect, SuspectedSize
 from wipx.report.diagnosis_words import next_step, symbol_of
 
 SCHEMA = 1

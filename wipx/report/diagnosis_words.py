@@ -4,7 +4,10 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect, LeftForce, NextExperiment, Period, Region
+from wipx.core.diagnosis import Combined, Diagnosis, FoundEffect
+from wipx.core.location import Period, Region
+from wipx.core.next_experiment import NextExperiment
+from wipx.core.remainder import LeftForce
 from wipx.core.results import Estimate
 from wipx.effects.catalogue import kind_of
 from wipx.effects.words import effect_in_words, in_a_row, site_in_words

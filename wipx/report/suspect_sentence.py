@@ -1,6 +1,6 @@
 """What the recordings say of a suspect, in words."""
 
-from wipx.core.diagnosis import Suspect, SuspectedSize
+from wipx.core.suspect import Suspect, SuspectedSize
 from wipx.report.diagnosis_words import nats, symbol_of, value_in_words
 from wipx.report.numbers import compact, significant
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench
 
-from wipx.core.diagnosis import Diagnosis, Suspect, SuspectedSize
+from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
 from wipx.core.results import Estimate
+from wipx.core.suspect import Suspect, SuspectedSize
 from wipx.diagnosis.answer.suspects import check_suspects
 from wipx.effects.remainder import KNOTS
 from wipx.report.diagnosis_json import diagnosis_json

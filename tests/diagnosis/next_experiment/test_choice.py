@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from identify.emulated_robot import RATE, Robot, controller, nominal_model
 
-from wipx.core.diagnosis import NextExperiment
 from wipx.core.model import Model
+from wipx.core.next_experiment import NextExperiment
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting

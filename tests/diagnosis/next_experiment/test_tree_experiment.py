@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from wipx.core.diagnosis import NextExperiment
 from wipx.core.drive import Drive
 from wipx.core.limits import JointLimits
 from wipx.core.model import Model
+from wipx.core.next_experiment import NextExperiment
 from wipx.core.plant import Plant, robot_plant
 from wipx.core.recording import Recording
 from wipx.core.tree import Tree

@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wipx.core.diagnosis import FoundEffect, Suspect, SuspectedSize
+from wipx.core.diagnosis import FoundEffect
 from wipx.core.recording import Recording
 from wipx.core.results import Estimate
+from wipx.core.suspect import Suspect, SuspectedSize
 from wipx.proof.baseline_answers import MethodAnswer, NamedEffect
 from wipx.proof.real_machines.published import Published
 from wipx.proof.real_machines.recordings import only

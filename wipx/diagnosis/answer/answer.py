@@ -5,19 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from wipx.core.diagnosis import (
-    Alternative,
-    Combined,
-    ConsideredEffect,
-    Diagnosis,
-    FoundEffect,
-    NextExperiment,
-    Remainder,
-    Unexplained,
-    Verdict,
-)
+from wipx.core.diagnosis import Alternative, Combined, ConsideredEffect, Diagnosis, FoundEffect, Verdict
 from wipx.core.limits import JointLimits
 from wipx.core.model import Model
+from wipx.core.next_experiment import NextExperiment
+from wipx.core.remainder import Remainder, Unexplained
 from wipx.core.results import Estimate, FitErrors, Trace
 from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wipx.core.diagnosis import Curve
+from wipx.core.curve import Curve
 from wipx.core.effect import Steady
 from wipx.core.model import Model
 from wipx.diagnosis.likelihood.fitting import Fit

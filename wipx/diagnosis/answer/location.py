@@ -8,7 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wipx.core.diagnosis import ErrorMap, FoundEffect, Location, Period, Region
+from wipx.core.diagnosis import FoundEffect
+from wipx.core.location import ErrorMap, Location, Period, Region
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.fitting import Fit

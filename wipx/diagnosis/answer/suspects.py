@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri
 
-from wipx.core.diagnosis import Diagnosis, Suspect, SuspectedSize
+from wipx.core.diagnosis import Diagnosis
 from wipx.core.effect import Effect
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.parameters import Scales
 from wipx.core.results import NINETY_FIVE, Estimate
+from wipx.core.suspect import Suspect, SuspectedSize
 from wipx.diagnosis.candidates.screening import candidates_beside
 from wipx.diagnosis.decision.confirmation import Rest
 from wipx.diagnosis.decision.context import Context

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.diagnosis import Experiment, NextExperiment
 from wipx.core.limits import JointLimits
+from wipx.core.next_experiment import Experiment, NextExperiment
 from wipx.core.results import NINETY_FIVE
 from wipx.diagnosis.likelihood.fitting import DAMPINGS, LARGEST_STEP, SECANT, Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting

@@ -7,7 +7,7 @@ white innovations linearised in the force; size and smoothness maximise the marg
 import numpy as np
 from scipy.optimize import minimize
 
-from wipx.core.diagnosis import Curve
+from wipx.core.curve import Curve
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wipx.core.diagnosis import HorizonErrors, LeftForce
 from wipx.core.model import Model
 from wipx.core.plant import Plant
+from wipx.core.remainder import HorizonErrors, LeftForce
 from wipx.core.results import HORIZON, Trace
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import linearise_along

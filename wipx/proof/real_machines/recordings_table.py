@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from wipx.core.diagnosis import Diagnosis, FoundEffect, Suspect
+from wipx.core.diagnosis import Diagnosis, FoundEffect
+from wipx.core.suspect import Suspect
 from wipx.proof.baseline_answers import MethodAnswer
 from wipx.proof.real_machines.published import Published
 from wipx.report.diagnosis_words import nats, value_in_words
