@@ -6,6 +6,7 @@ UNITS = {
     # dimension: (unit at a sliding joint, unit at a turning joint)
     "force": ("N", "N m"),
     "limit": ("N", "N m"),  # of an actuator; measured by the largest command
+    "load": ("N", "N m"),  # of an actuator; measured by its usual command
     "velocity": ("m/s", "rad/s"),
     "coordinate": ("m", "rad"),
     "damping": ("N s/m", "N m s/rad"),
@@ -19,7 +20,7 @@ UNITS = {
     "moment": ("s", "s"),  # a time of the recording
     "ratio": ("1", "1"),
     "per_time": ("1/s", "1/s"),
-    "per_force": ("1/N", "1/(N m)"),
+    "per_load": ("1/N", "1/(N m)"),
 }
 
 
@@ -35,6 +36,7 @@ class Scales:
         length: Size of the body [m].
         duration: Length of a recording [s].
         command: Largest force that was commanded [N or N m].
+        usual: Mean size of the force that was commanded [N or N m].
     """
 
     force: float = 1.0
@@ -44,12 +46,14 @@ class Scales:
     length: float = 1.0
     duration: float = 10.0
     command: float = 1.0
+    usual: float = 1.0
 
     def of(self, dimension: str) -> float:
         """The characteristic size of a `dimension` of `UNITS`, in its SI unit."""
         return {
             "force": self.force,
             "limit": self.command,
+            "load": self.usual,
             "velocity": self.velocity,
             "coordinate": self.coordinate,
             "damping": self.force / self.velocity,
@@ -63,7 +67,7 @@ class Scales:
             "moment": self.duration,
             "ratio": 1.0,
             "per_time": 1.0,
-            "per_force": 1.0 / self.force,
+            "per_load": 1.0 / self.usual,
         }[dimension]
 
 

@@ -9,9 +9,9 @@ EFFECT = Effect(
     sites=("actuator", "drive"),
     parameters=(
         Parameter("d", "share of the force that is lost per second", "per_time", 0.0, -0.05, 0.05, 0.0),
-        Parameter("l", "share of the force that is lost per force", "per_force", 0.0, -0.5, 0.5, 0.0),
+        Parameter("l", "share of the force that is lost per force", "per_load", 0.0, -0.5, 0.5, 0.0),
         Parameter("t_0", "time at which nothing is lost", "moment", 0.0, 0.0, 1.0, 0.5),
-        Parameter("u_0", "force at which nothing is lost", "force", 0.0, 0.0, 1.0, 0.5),
+        Parameter("u_0", "force at which nothing is lost", "load", 0.0, 0.0, 2.0, 1.0),
     ),
     law="F = u (1 - d (t - t_0) - l (abs(u) - u_0))",
     linear_in=("d", "l"),

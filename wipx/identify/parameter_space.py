@@ -217,6 +217,7 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
         commanded = np.abs(_asked(model, site, recorded, np.concatenate([r[column] for r in recordings])))
     force = max(float(np.quantile(commanded, 0.99)), _inertia(model, site) * velocity / 0.1)
     largest = max(float(commanded.max()), 1e-6 * force)
+    usual = max(float(commanded.mean()), 1e-6 * force)
     if plant.tree is not None:
         body = next(link.body for link in plant.tree.links if link.joint == site)
         reach = [float(np.linalg.norm(link.place)) for link in plant.tree.links if link.place.any()]
@@ -226,7 +227,7 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     else:
         mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
         length = p.get("com_height", p.get("link1_length", 1.0))
-    return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings), largest)
+    return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings), largest, usual)
 
 
 def _asked(model: Model, site: str, command: np.ndarray, coordinate: np.ndarray) -> np.ndarray:

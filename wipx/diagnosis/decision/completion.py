@@ -8,18 +8,25 @@ from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.search import Chosen, Search
+from wipx.effects.catalogue import kind_of
+
+
+def is_everywhere(effect: str) -> bool:
+    """Whether every machine has a little of an effect "site/kind"."""
+    return bool(kind_of(effect).tolerance)
 
 
 def dominant(search: Search, fit: Fit) -> Chosen:
     """Without the least effects, which together remove little beside what stays.
 
-    They may be a part of what no law describes; not so those that recorded forces show as well.
+    They may be a part of what no law describes; not so those that recorded forces show as well. What every machine has
+    a little of stays.
     """
     fitter, setting = search.store.fitter, search.store.setting
     assert isinstance(fitter, ForecastFitter)
     stays = fitter.squared_errors(fit)
     kept, considered = fit, ()
-    while doubtful := [effect for effect in kept.effects if not setting.expects(effect)]:
+    while doubtful := [each for each in kept.effects if not (setting.expects(each) or is_everywhere(each))]:
         without = {effect: search.store.without(kept, effect) for effect in doubtful}
         grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
         least = min(grown, key=lambda effect: grown[effect])

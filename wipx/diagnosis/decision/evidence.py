@@ -10,10 +10,11 @@ answer counts.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from wipx.diagnosis.decision.completion import completed, dominant
+from wipx.diagnosis.decision.completion import completed, dominant, is_everywhere
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -26,6 +27,7 @@ from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
 from wipx.diagnosis.selection.search import Chosen, Search
 
 Watcher = Callable[[str, float], None]
+Done = TypeVar("Done")
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ def found(context: Context, search: Search, watcher: Watcher) -> Found:
         watcher: Told the stage and the share that is done.
     """
     if isinstance(search, RobotSearch):
-        return _with_minor_effects(_found_on_tree(context, search, watcher))
-    return _with_minor_effects(_by_innovations(context, search, search.run(), watcher))
+        return _found_on_tree(context, search, watcher)
+    return _by_innovations(context, search, search.run(), watcher)
 
 
 def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
@@ -151,7 +153,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     if setting.nominal.plant.tree is not None:
         ahead = ahead.trusting(best.fit)
         same_names = set(best.fit.effects) == set(chosen.effects)
-        return Found(ahead, search, *_left_over(ahead, search.nominal, best)), same_names
+        return _with_minor_effects(Found(ahead, search, *_left_over(ahead, search.nominal, best))), same_names
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
     same = nominal
     if chosen.effects:
@@ -163,35 +165,44 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tupl
     hardly = set(same.effects) == set(best.fit.effects) or criteria.lead(best.fit, same) < least_gain
     agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
     ahead = ahead.trusting(best.fit)
-    return Found(ahead, search, *_left_over(ahead, search.nominal, best)), agrees
+    return _with_minor_effects(Found(ahead, search, *_left_over(ahead, search.nominal, best))), agrees
 
 
 def _with_minor_effects(end: Found) -> Found:
-    """What was found, where forecasts decide with those effects told that are small beside what no law describes.
+    """What forecasts found, with what every machine has a little of, and with small effects told.
 
-    They stay in the completed model, unless no other is there. What every machine has a little of joins them.
+    Small are those that remove little beside what no law describes. They stay in the completed model, unless no other
+    is there.
     """
-    context, search, rest = end.context, end.search, end.rest
-    if not isinstance(context.fitter, ForecastFitter):
-        return end
-    by_part = context.fitter.simulator.side_by_side
-    kept = by_part(lambda piece: dominant(*piece), search.split(rest.fit)) if rest.fit.effects else []
-    considered = rest.considered + tuple(each for chosen in kept for each in chosen.considered)
-    named = {effect for chosen in kept for effect in chosen.fit.effects}
-    begun = rest.fit if named else search.nominal
-    search = search.knowing(tolerances(search.store.setting, context.fitter, context.fitter.predictions, begun))
-    context = replace(context, setting=search.store.setting)
-    parts = search.split(begun)
-    better = tuple(by_part(lambda piece: completed(*piece), parts))
-    changed = any(new is not old for new, (_, old) in zip(better, parts, strict=True))
-    whole = search.joined(begun, better) if changed else begun
+    search, whole = _completed(end.search, end.rest.fit)
+    kept = _by_part(search, whole, dominant)
+    considered = end.rest.considered + tuple(each for chosen in kept for each in chosen.considered)
+    named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
+    if not named and end.rest.fit.effects:
+        search, whole = _completed(end.search, end.search.nominal)
     minor = tuple(effect for effect in whole.effects if effect not in named)
-    if whole is rest.fit:
-        return Found(context, search, replace(rest, minor=minor, considered=considered), end.shapes)
+    context = replace(end.context, setting=search.store.setting)
+    if whole is end.rest.fit:
+        return Found(context, search, replace(end.rest, minor=minor, considered=considered), end.shapes)
     context = context.trusting(whole)
     left, shapes = _left_over(context, search.nominal, Chosen(whole, considered))
-    left = replace(left, significant=left.significant or rest.significant, minor=minor)
+    left = replace(left, significant=left.significant or end.rest.significant, minor=minor)
     return Found(context, search, left, shapes)
+
+
+def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:
+    """A search that knows the laws which every machine follows a little, and a fit with those that it needs."""
+    fitter = search.store.fitter
+    assert isinstance(fitter, ForecastFitter)
+    search = search.knowing(tolerances(search.store.setting, fitter, fitter.predictions, fit))
+    better = _by_part(search, fit, completed)
+    changed = any(new is not old for new, (_, old) in zip(better, search.split(fit), strict=True))
+    return search, search.joined(fit, tuple(better)) if changed else fit
+
+
+def _by_part(search: Search, fit: Fit, do: Callable[[Search, Fit], Done]) -> list[Done]:
+    """What is done with each part of a robot that has effects, side by side."""
+    return search.store.fitter.simulator.side_by_side(lambda piece: do(*piece), search.split(fit))
 
 
 def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:

@@ -200,14 +200,17 @@ class ForecastFitter(Fitter):
         return float(gains.sum()) >= max(least, reach * self.stretches.chance(gains))
 
     def squared_errors(self, fit: Fit) -> np.ndarray:
-        """Mean squared error of each joint over the longest horizon, by numbers that suit other stretches, (joints,).
+        """Squared scale of each joint's errors over the longest horizon, by numbers that suit other stretches.
 
-        In units of its noise.
+        Errors have heavy tails here as in the likelihood: a few predictions that fell over decide nothing.
+
+        Returns:
+            Shape (joints,), in units of the squared noise.
         """
         batch = fit.hypothesis.space.batch(self._judged_by_others(fit)[0])
         errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)[:, :, -self.data.joints :]
-        own = errors[self.stretches.part, np.arange(self.predictions.count)]
-        return np.mean(own[self.predictions.counted] ** 2, axis=0)
+        own = errors[self.stretches.part, np.arange(self.predictions.count)][self.predictions.counted]
+        return np.ravel(fitted_whitening(own.T[:, :, None])[0]) ** -2.0
 
     def odds_of(self, effects: tuple[str, ...]) -> float:
         """Those of picking an effect from all that are looked for, unless it is likely."""
