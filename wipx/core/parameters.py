@@ -36,7 +36,7 @@ class Scales:
         length: Size of the body [m].
         duration: Length of a recording [s].
         command: Largest force that was commanded [N or N m].
-        usual: Mean size of the force that was commanded [N or N m].
+        usual: Mean size of the force that was commanded, weighed by its square [N or N m].
     """
 
     force: float = 1.0

@@ -16,7 +16,7 @@ EFFECT = Effect(
     linear_in=("s", "c"),
     source="Ellin, Dolsak 2008, The design and application of rotary encoders, Sensor Review 28(2)",
     outside_vocabulary=True,
-    tolerance={"s": 0.015, "c": 0.015},
+    tolerance={"s": 0.01, "c": 0.01},
     rows={"ECCENTRIC_SINE": "s", "ECCENTRIC_COSINE": "c", "ECCENTRIC_NUMBER": "n"},
     parts=("ECCENTRICITY",),
 )
