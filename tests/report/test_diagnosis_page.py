@@ -50,6 +50,19 @@ def test_small_laws_of_the_model_are_told_and_not_among_what_was_left_out():
     assert "Also in the completed model" not in words(whole)
 
 
+def test_laws_that_every_machine_follows_a_little_are_told_apart_from_small_ones():
+    whole = synthetic_diagnosis.mismatch()
+    friction, delay = whole.effects
+    encoder = replace(delay, name="sensor_theta/eccentricity")
+    told = words(replace(whole, effects=(friction,), minor=(delay, encoder)))
+    assert "Predictions hardly need it" in told
+    assert "So is eccentricity of the pitch sensor" in told
+    assert "Nearly every machine has a little of it" in told
+    alone = words(replace(whole, effects=(friction,), minor=(encoder,)))
+    assert "Predictions hardly need" not in alone
+    assert "Also in the completed model: eccentricity of the pitch sensor" in alone
+
+
 def test_page_of_a_mismatch_says_what_where_how_sure_and_what_next():
     text = words(synthetic_diagnosis.mismatch())
     for part in (
