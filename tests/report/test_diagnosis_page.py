@@ -53,7 +53,7 @@ def test_small_laws_of_the_model_are_told_and_not_among_what_was_left_out():
 def test_laws_that_every_machine_follows_a_little_are_told_apart_from_small_ones():
     whole = synthetic_diagnosis.mismatch()
     friction, delay = whole.effects
-    encoder = replace(delay, name="sensor_theta/eccentricity")
+    encoder = replace(delay, name="sensor_theta/eccentricity", everywhere=True)
     told = words(replace(whole, effects=(friction,), minor=(delay, encoder)))
     assert "Predictions hardly need it" in told
     assert "So is eccentricity of the pitch sensor" in told

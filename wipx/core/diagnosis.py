@@ -64,6 +64,7 @@ class FoundEffect:
         present_probability: Of this name among those that could stand in its place.
         share: Of the explained mismatch.
         curve: Its law on the data; None where a curve over one signal does not show it.
+        everywhere: Whether every machine has a little of it, so that it is not named.
     """
 
     name: str
@@ -78,6 +79,7 @@ class FoundEffect:
     present_probability: float
     share: float
     curve: Curve | None
+    everywhere: bool = False
 
     def value(self, symbol: str) -> float:
         """Its number of that symbol [SI]."""

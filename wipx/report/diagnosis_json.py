@@ -66,6 +66,7 @@ def _effect(effect: FoundEffect) -> dict[str, object]:
         "present_probability": float(effect.present_probability),
         "share": float(effect.share),
         "beyond_vocabulary": bool(effect.outside_vocabulary),
+        "everywhere": bool(effect.everywhere),
         "rivals": [
             {"name": rival.name, "separation": float(rival.separation), "parameters": _floats(rival.parameters)}
             for rival in effect.rivals

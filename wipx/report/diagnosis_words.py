@@ -9,7 +9,6 @@ from wipx.core.location import Period, Region
 from wipx.core.next_experiment import NextExperiment
 from wipx.core.remainder import LeftForce
 from wipx.core.results import Estimate
-from wipx.effects.catalogue import kind_of
 from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
 
@@ -123,7 +122,7 @@ def minor_sentence(diagnosis: Diagnosis) -> str:
         laws = [f"{effect_in_words(each.name, kind)} ({own})" for each, own in zip(effects, numbers, strict=True)]
         return in_a_row(laws)
 
-    usual = [effect for effect in diagnosis.minor if kind_of(effect.name).tolerance]
+    usual = [effect for effect in diagnosis.minor if effect.everywhere]
     small = [effect for effect in diagnosis.minor if effect not in usual]
     sentences = []
     if small:

@@ -161,6 +161,7 @@ def _effects_of_part(
                 probability,
                 0.0,
                 law_curve(context.by_row, _taken_out(context, fit, effect), fit, effect, shapes),
+                bool(law.tolerance),
             )
         )
     return found
