@@ -19,6 +19,7 @@ UNITS = {
     "time": ("s", "s"),
     "moment": ("s", "s"),  # a time of the recording
     "ratio": ("1", "1"),
+    "per_coordinate": ("1/m", "1/rad"),
     "per_time": ("1/s", "1/s"),
     "per_load": ("1/N", "1/(N m)"),
 }
@@ -66,6 +67,7 @@ class Scales:
             "time": 1.0,
             "moment": self.duration,
             "ratio": 1.0,
+            "per_coordinate": 1.0,
             "per_time": 1.0,
             "per_load": 1.0 / self.usual,
         }[dimension]

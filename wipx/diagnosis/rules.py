@@ -88,7 +88,7 @@ class ForecastRules(EvidenceRules):
     )
     least_removed: float = rule(
         0.5,
-        "of the squared error that stays",
+        "of the squared scale of the errors that stay",
         "what an effect removes at some joint from predictions over 0.5 s, below which it is not named",
         "judgement: what is smaller may be a part of what no law describes",
         0.0,

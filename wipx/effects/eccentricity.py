@@ -8,9 +8,9 @@ EFFECT = Effect(
     words="eccentricity of {place}",
     sites=SENSOR_SITES,
     parameters=(
-        Parameter("s", "largest relative error of the rate, of the sine", "ratio", 0.0, -0.2, 0.2, 0.0),
-        Parameter("c", "largest relative error of the rate, of the cosine", "ratio", 0.0, -0.2, 0.2, 0.0),
-        Parameter("n", "periods per radian (or metre) times 2 pi", "ratio", 1.0, 0.1, 1000.0, 1.0),
+        Parameter("s", "relative error of the rate that the sine makes at most", "ratio", 0.0, -0.2, 0.2, 0.0),
+        Parameter("c", "relative error of the rate that the cosine makes at most", "ratio", 0.0, -0.2, 0.2, 0.0),
+        Parameter("n", "periods per turn of the joint (or per 2 pi m)", "per_coordinate", 1.0, 0.1, 1000.0, 1.0),
     ),
     law="recorded = q + (s sin(n q) + c cos(n q)) / n",
     linear_in=("s", "c"),

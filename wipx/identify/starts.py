@@ -45,7 +45,7 @@ def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Se
 
 def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
     """Starts by each of B models, with a filter for each or one for all; these smooth at `leads_of` the windows."""
-    until, first = _until(windows), windows.inputs.first
+    until, first = start_rows(windows), windows.inputs.first
     found = smoother.following(batch, filters)
     found = found.reshape(batch.size, -1, windows.count, found.shape[2])
     place = np.clip(np.arange(until.max() + 1)[:, None] - first, 0, until - first)
@@ -55,11 +55,11 @@ def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: 
 
 def leads_of(windows: Windows) -> Places:
     """The rows from the first that is simulated to the start of each window: first ones of all windows, then second."""
-    until, first = _until(windows), windows.inputs.first
+    until, first = start_rows(windows), windows.inputs.first
     rows = np.minimum(np.arange(np.max(until - first) + 1)[:, None], until - first) + first + windows.row
     return Places(rows.ravel(), np.broadcast_to(windows.recording, rows.shape).ravel())
 
 
-def _until(windows: Windows) -> np.ndarray:
+def start_rows(windows: Windows) -> np.ndarray:
     """Row of each window at which its prediction starts, shape (R,)."""
     return np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1

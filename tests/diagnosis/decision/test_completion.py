@@ -34,7 +34,7 @@ def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPa
     kept = dominant(search, search.store.keep(more))
     assert kept.fit.effects == friction.effects
     assert [each.name for each in kept.considered] == ["environment/spring"]
-    without, stays = (fitter.squared_errors(fit) for fit in (search.nominal, kept.fit))
+    without, stays = (fitter.squared_scales(fit) for fit in (search.nominal, kept.fit))
     assert without[0] / stays[0] > 1.0 + fitter.rules.forecasts.least_removed
     monkeypatch.setattr(Setting, "expects", lambda self, effect: effect == "environment/spring")
     assert dominant(search, more).fit is more  # recorded forces show it as well
@@ -50,7 +50,7 @@ def test_a_drive_that_sags_sags_in_the_completed_model_and_makes_it_predict_bett
     more = completed(knowing, friction)
     assert "actuator/sag" in more.effects
     assert more.hypothesis.values["actuator/sag.l"] == pytest.approx(0.1, abs=0.06)
-    assert fitter.squared_errors(more)[0] < fitter.squared_errors(friction)[0]
+    assert fitter.squared_scales(more)[0] < fitter.squared_scales(friction)[0]
 
 
 def test_a_drive_that_does_not_sag_does_not_in_the_completed_model(fresh_seed: int):

@@ -24,11 +24,11 @@ def dominant(search: Search, fit: Fit) -> Chosen:
     """
     fitter, setting = search.store.fitter, search.store.setting
     assert isinstance(fitter, ForecastFitter)
-    stays = fitter.squared_errors(fit)
+    stays = fitter.squared_scales(fit)
     kept, considered = fit, ()
     while doubtful := [each for each in kept.effects if not (setting.expects(each) or is_everywhere(each))]:
         without = {effect: search.store.without(kept, effect) for effect in doubtful}
-        grown = {effect: np.max(fitter.squared_errors(smaller) / stays) for effect, smaller in without.items()}
+        grown = {effect: np.max(fitter.squared_scales(smaller) / stays) for effect, smaller in without.items()}
         least = min(grown, key=lambda effect: grown[effect])
         if grown[least] >= 1.0 + fitter.rules.forecasts.least_removed:
             break

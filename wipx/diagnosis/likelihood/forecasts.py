@@ -199,7 +199,7 @@ class ForecastFitter(Fitter):
         least = self.rules.selection.least_gain - float(np.log(self.looked_at / picked_from))
         return float(gains.sum()) >= max(least, reach * self.stretches.chance(gains))
 
-    def squared_errors(self, fit: Fit) -> np.ndarray:
+    def squared_scales(self, fit: Fit) -> np.ndarray:
         """Squared scale of each joint's errors over the longest horizon, by numbers that suit other stretches.
 
         Errors have heavy tails here as in the likelihood: a few predictions that fell over decide nothing.

@@ -16,7 +16,7 @@ from wipx.core.results import HORIZON
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import Smoother
-from wipx.identify.starts import leads_of, starts_by
+from wipx.identify.starts import leads_of, start_rows, starts_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
 
@@ -82,8 +82,7 @@ class Predictions:
     def recorded(self) -> np.ndarray:
         """Recorded coordinates where each starts and at its horizons, shape (N, 1 + H, joints)."""
         windows = self.windows
-        start = np.sum(windows.inputs.t <= windows.starts + 1e-6, axis=0) - 1
-        return windows.recorded[np.stack([start, *self.sampled]), :, np.arange(self.count)].swapaxes(0, 1)
+        return windows.recorded[np.stack([start_rows(windows), *self.sampled]), :, np.arange(self.count)].swapaxes(0, 1)
 
     @cached_property
     def counted(self) -> np.ndarray:

@@ -14,10 +14,10 @@ from wipx.effects.catalogue import kind_of, vocabulary
 from wipx.identify.parameter_space import effect_parameters
 
 ECCENTRICITY = "eccentricity"
-EVERYWHERE = 1e-6  # periods of an error that is the same at all angles
+EVERYWHERE = 1e-6  # periods per turn of an error that is the same at all angles
 SHIFT = 3.0  # times the sensor noise, by which such an error shows what it does to predictions
-TRIED = 16  # numbers of periods
-FEWEST = 4.0  # per turn of a joint; with fewer an encoder has a bias and a scale, as the vocabulary says
+TRIED = 16  # numbers of periods between fewest and most
+FEWEST = 4.0  # periods per turn of a hinge; fewer look like the bias and the scale error of the vocabulary
 PULLEY = 0.05  # [m] radius of the largest pulley of a rail whose wheel is not known
 RANGE = 10.0  # most periods over fewest
 
@@ -79,7 +79,7 @@ def _shifted(model: Model, encoder: str, shift: float) -> Model:
 
 
 def _tried(model: Model, joint: str) -> np.ndarray:
-    """Numbers of periods per radian or metre of a joint."""
+    """Numbers of periods per turn of a hinge, or per 2 pi m of a rail."""
     radius = model.parameters.get("wheel_radius", PULLEY)
     fewest = FEWEST if model.plant.is_angular(joint) else 1.0 / radius
     return np.geomspace(fewest, RANGE * fewest, TRIED)
@@ -94,7 +94,7 @@ def _slopes(predictions: Predictions, j: int, response: np.ndarray, numbers: np.
         predictions: N of them.
         j: The joint.
         response: Errors by an error of all angles, shape (N, H joints).
-        numbers: Of periods per radian or metre.
+        numbers: As `_tried` has them.
     """
     place = predictions.recorded[..., j]  # (N, 1 + H)
     own = np.zeros((place.shape[1] - 1, len(predictions.noise)))
