@@ -1,18 +1,23 @@
 """Where predictions start: smoothed states follow right models closely, forgive wrong ones, and know no future."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from identify.emulated_robot import Robot, nominal_model
+from identify.stiff_arm import ENGINE, NOISE, motion, stiff_arm
 
-from wipx.core.model import ModelBatch
+from wipx.core.model import Model, ModelBatch
+from wipx.core.recording import Recording
 from wipx.identify.evaluation import Judge
+from wipx.identify.kalman import Places
 from wipx.identify.noise import sensor_noise
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
 from wipx.identify.starts import leads_of, starts_by
 from wipx.identify.windows import LOOK_AHEAD, cut
 from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.inputs import Inputs
 
 SIMULATOR = AnalyticSimulator(threads=1)
 KINDS = ("wip", "pendulum", "linear_axis", "double_pendulum")
@@ -73,3 +78,38 @@ def test_a_constant_acceleration_that_the_model_lacks_is_found(fresh_seed: int):
     p = nominal.parameters
     mass = p["body_mass"] + p["wheel_mass"] + p["wheel_inertia"] / p["wheel_radius"] ** 2
     assert np.median(missing[200 : len(recordings[0])]) == pytest.approx(force / mass, rel=0.1)
+
+
+def error_over_claim(model: Model, recording: Recording, true: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Typical error of smoothed states over the deviation that the filter claims, shape (2 joints,)."""
+    smoother = Smoother(ENGINE, model.plant, (recording,), noise)
+    rows = np.arange(200, len(recording) - 50, 5)
+    bandwidth = np.full(len(noise), 3.0)
+    places = Places(rows, np.zeros_like(rows))
+    found = smoother.along(model, bandwidth)[rows, :, 0]
+    claimed = np.sqrt(np.diagonal(smoother.filtered(model, bandwidth, places).spread(), axis1=1, axis2=2))
+    return np.sqrt(np.mean(((found - true[rows]) / claimed) ** 2, axis=0))
+
+
+def test_states_of_an_arm_with_a_stiff_position_drive_err_as_the_filter_says(tmp_path: Path, fresh_seed: int):
+    pytest.importorskip("mujoco")
+    model = stiff_arm(tmp_path)
+    recording, run = motion(model, np.random.default_rng(fresh_seed), 4.0)
+    true = np.concatenate([run.coordinates[:, :, 0, 0], run.rates[:, :, 0, 0]], axis=1)
+    assert np.all(error_over_claim(model, recording, true, NOISE) < 1.6)
+
+
+def test_states_from_a_log_of_mean_commands_err_as_the_filter_says(fresh_seed: int):
+    """Each row has the mean of four noisy commands: how they shook the robot within the row is not in the log."""
+    model, rng = nominal_model("linear_axis"), np.random.default_rng(fresh_seed)
+    t = np.arange(0.0, 8.0, 0.002)
+    force = 2.0 * np.sin(3.0 * t) + 20.0 * rng.normal(size=len(t))
+    run = SIMULATOR.replay(ModelBatch(model), Inputs.of([t], [force[:, None]], [0]), np.zeros((2, 1, 1)))
+    noise = np.array([2e-6])
+    kept = slice(0, len(t), 4)
+    columns = {"t": t[kept], "x": run.coordinates[kept, 0, 0, 0] + noise * rng.normal(size=len(t[kept]))}
+    recording = Recording("means.csv", {**columns, "u": force.reshape(-1, 4).mean(axis=1)}, periods=4)
+    true = np.stack([run.coordinates[kept, 0, 0, 0], run.rates[kept, 0, 0, 0]], axis=1)
+    assert np.all(error_over_claim(model, recording, true, noise) < 1.6)
+    blind = replace(recording, periods=1)
+    assert np.all(error_over_claim(model, blind, true, noise) > 3.0)

@@ -1,7 +1,7 @@
 """Judging a model: prediction errors over windows, and the predictions themselves."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class Judge:
     noise: np.ndarray
     horizon: float
     bandwidths: Mapping[str, float] | None = None
+    _smoothers: list[Smoother] = field(default_factory=list, compare=False, repr=False)
 
     def predict(self, model: Model, recordings: tuple[Recording, ...]) -> list[np.ndarray]:
         """Predicted coordinates of each recording, shape (rows, joints); NaN before the first window."""
@@ -95,7 +96,12 @@ class Judge:
         return bandwidths[int(np.argmin(errors[windows.predicted].sum(axis=0)))]
 
     def _smoother(self, model: Model, recordings: tuple[Recording, ...]) -> Smoother:
-        return Smoother(AnalyticSimulator(self.simulator.step), model.plant, recordings, self.noise)
+        for known in self._smoothers:
+            same = len(known.recordings) == len(recordings)
+            if same and all(one is other for one, other in zip(known.recordings, recordings, strict=True)):
+                return known
+        self._smoothers.append(Smoother(AnalyticSimulator(self.simulator.step), model.plant, recordings, self.noise))
+        return self._smoothers[-1]
 
     def _starts(self, model: Model, recordings: tuple[Recording, ...]) -> Starts:
         """Windows of the recordings, each with the states of the filter that it starts from."""

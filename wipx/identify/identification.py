@@ -17,6 +17,7 @@ from wipx.identify.objectives import FitData, Objective
 from wipx.identify.optimizers.search import Minimum, Optimizer, Watcher, unwatched
 from wipx.identify.parameter_space import ParameterSpace, parameter_space, scales_of
 from wipx.identify.problem import WindowProblem
+from wipx.identify.resolution import resolving
 from wipx.sim.simulator import Simulator, StateFeedback
 
 AT_BOUND = 1e-4  # of the search interval
@@ -102,6 +103,7 @@ def identify(
     scales = scales_of(prepared, split.fit)
     space = parameter_space(prepared, request.switched_on, request.uncertainty, request.free, request.bounds, scales)
     noise = sensor_noise(split.fit, nominal.plant)
+    simulator = resolving(simulator, prepared, split.fit, noise)
     speeds = tuple(scales[site].velocity for site in nominal.plant.joints)
     data = FitData(split.fit, nominal, simulator, noise, speeds, request.feedback)
     problem = objective.problem(data, space)

@@ -108,12 +108,19 @@ class Filter:
 
 
 def gains_along(
-    linear: Linearisation, t: np.ndarray, last: np.ndarray, sensor: np.ndarray, rate: np.ndarray, late: np.ndarray
+    linear: Linearisation,
+    jolts: np.ndarray,
+    t: np.ndarray,
+    last: np.ndarray,
+    sensor: np.ndarray,
+    rate: np.ndarray,
+    late: np.ndarray,
 ) -> Gains:
     """Gains along R recordings.
 
     Args:
         linear: The body along them.
+        jolts: Covariance by which coordinates move unseen from each row to the next, shape (K + 1, R, joints, joints).
         t: Times of the rows, shape (K + 1, R) [s].
         last: Last row of each recording, shape (R,).
         sensor: Standard deviation of each coordinate, shape (joints,) [m or rad].
@@ -125,37 +132,29 @@ def gains_along(
     gains = np.zeros((*t.shape, n, len(late)))
     covariance = np.zeros_like(moves)
     innovation = np.zeros((*t.shape, len(late), len(late)))
-    _filter(moves, t, last, sensor**2, rate, late, gains, covariance, innovation)
+    _filter(moves, t, last, sensor**2, rate, late, jolts, gains, covariance, innovation)
     return Gains(moves, gains, covariance, innovation)
-
-
-@cached
-def _transition(a, dt, small, out):
-    """Transition of coordinates, rates and added accelerations over an interval."""
-    joints = a.shape[0]
-    transition_over(a, dt, small)
-    out[:] = 0.0
-    out[: 2 * joints, : 2 * joints] = small
-    for j in range(joints):
-        out[j, 2 * joints + j] = 0.5 * dt * dt
-        out[joints + j, 2 * joints + j] = dt
-        out[2 * joints + j, 2 * joints + j] = 1.0
 
 
 @cached
 def _moves(a, place, t, last):
     """Transitions to every row from the one before, shape (K + 1, R, n, n)."""
-    n = 3 * a.shape[1]
-    small = np.zeros((n - a.shape[1], n - a.shape[1]))
-    found = np.zeros((*place.shape, n, n))
+    joints, size = a.shape[1:]
+    small, pushed = np.zeros((size, size)), np.zeros((size, joints))
+    found = np.zeros((*place.shape, size + joints, size + joints))
     for r in range(place.shape[1]):
         for k in range(last[r]):
-            _transition(a[place[k, r]], t[k + 1, r] - t[k, r], small, found[k + 1, r])
+            transition_over(a[place[k, r]], t[k + 1, r] - t[k, r], small, pushed)
+            move = found[k + 1, r]
+            move[:size, :size] = small
+            move[:size, size:] = pushed
+            for j in range(joints):
+                move[size + j, size + j] = 1.0
     return found
 
 
 @cached
-def _filter(moves, t, last, sensor, rate, late, gains, covariance, innovation):
+def _filter(moves, t, last, sensor, rate, late, jolts, gains, covariance, innovation):
     """Gains, covariances after each row, and inverse covariances of the innovations, of every recording."""
     joints, n = len(late), moves.shape[2]
     p, shown, work = np.zeros((n, n)), np.zeros((n, joints)), np.zeros((n, n))
@@ -173,6 +172,7 @@ def _filter(moves, t, last, sensor, rate, late, gains, covariance, innovation):
             if k < last[r]:
                 _predict(p, moves[k + 1, r], work)
                 _wander(p, rate, t[k + 1, r] - t[k, r])
+                p[:joints, :joints] += jolts[k, r]
 
 
 @cached

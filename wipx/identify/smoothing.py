@@ -10,7 +10,7 @@ of a random walk and sensor noise of spectral density r [rad sqrt(s)] give a fil
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,8 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
-from wipx.identify.linearisation import linearise_along
+from wipx.identify.linearisation import Linearisation, linearise_along
+from wipx.identify.mean_commands import jolts
 from wipx.identify.sensors import delays_of, scales_of, true_states
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
@@ -27,6 +28,7 @@ from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Rollouts
 
 BANDWIDTHS = (1.0, 3.0, 10.0, 30.0, 100.0)  # [rad/s] from nearly no disturbance to nearly no model
+MOST_KNOWN = 8  # bodies that are kept; each holds as much as a recording for every joint
 FEWEST_ROWS = 4  # from which the first rates are read, at least
 
 
@@ -45,6 +47,9 @@ class Smoother:
     plant: Plant
     recordings: tuple[Recording, ...]
     noise: np.ndarray
+    _bodies: dict[tuple[float, ...], tuple[Linearisation, np.ndarray]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def along(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
         """States of a model at every row, shape (K + 1, 2 joints, R); zero after the last one.
@@ -125,8 +130,20 @@ class Smoother:
         scale, late = scales_of(one)[:, 0], delays_of(one)[:, 0]
         sensor = self.noise / np.abs(scale)
         rate = (np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval
-        along = gains_along(linearise_along(model, self._measured), inputs.t, inputs.last, sensor, rate, late)
+        along = gains_along(*self._body(model), inputs.t, inputs.last, sensor, rate, late)
         return Filter(along, scale, late, places, self._last_seen(places))
+
+    def _body(self, model: Model) -> tuple[Linearisation, np.ndarray]:
+        """A model's body along the recordings, and by how much single commands move it within each row."""
+        key = tuple(model.parameters.values())
+        known = self._bodies.get(key)
+        if known is None:
+            linear = linearise_along(model, self._inputs, self._measured)
+            known = linear, jolts(model, self.recordings, self._inputs, self._measured)
+            if len(self._bodies) >= MOST_KNOWN:
+                self._bodies.clear()
+            self._bodies[key] = known
+        return known
 
     def _last_seen(self, places: Places) -> np.ndarray:
         """Last row that the state at each place may be estimated from, shape (W,)."""

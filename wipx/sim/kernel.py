@@ -21,7 +21,7 @@ from wipx.sim.body import double_body, wip_body
 from wipx.sim.cache import cached
 from wipx.sim.joints import arrived, drifted, levels, smooth_friction
 from wipx.sim.rows import TOGETHER, W
-from wipx.sim.sensors import correct, feedback, guide, record
+from wipx.sim.sensors import correct, feedback, guide, pushed, record
 from wipx.sim.sticking import rates_at_the_end
 
 
@@ -285,6 +285,8 @@ def rollout(
                 if s == 0 or s >= least:
                     set_step(S, B, n, has, counts, s)
                 step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
+                if drift.shape[1] > 1:
+                    pushed(B, joints, n)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)
         record(B, n, on, has, past, t_rows, lanes, last_row, out, lane0, count)

@@ -96,7 +96,7 @@ def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift,
     `measured` has coordinates and rates of N joints, shape (K + 1, 2 N, R); `gains` the shape (groups, K + 1, R, 2 N
     states, 2 N channels), zero where nothing was measured; `group` says which of them each model has. `drift` has the
     gains of an acceleration that acts on each joint besides, shape (groups, K + 1, R, N, 2 N), or (1, 1, 1, N, 2 N)
-    without one: what it does until the next row is added at once.
+    without one.
     """
     windows, joints = measured.shape[2], measured.shape[1] // 2
     drifts = drift.shape[1] > 1
@@ -122,10 +122,18 @@ def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift,
             if on[R.ON_SENSOR_DELAY]:
                 correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, J[R.SENSOR_DELAY * W + w])
             if drifts and counts[w] > 0:
-                dt = t_rows[k + 1, window] - t_rows[k, window]
                 J[R.EXTRA * W + w] += extra
-                J[R.Q * W + w] -= 0.5 * J[R.EXTRA * W + w] * dt**2  # the rate below drifts on by twice this
-                J[R.V * W + w] += J[R.EXTRA * W + w] * dt
+
+
+@law
+def pushed(B, joints, n):
+    """What the accelerations that an observer adds do in a step."""
+    for j in range(joints):
+        J = B[j]
+        for w in range(n):
+            rate = J[R.EXTRA * W + w] * J[R.H * W + w]
+            J[R.Q * W + w] += 0.5 * J[R.H * W + w] * rate
+            J[R.V * W + w] += rate
 
 
 @law

@@ -11,6 +11,7 @@ from wipx.core.recording import Recording
 from wipx.core.results import HORIZON, FitErrors, Trace
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import sensor_noise
+from wipx.identify.resolution import resolving
 from wipx.recordings.model_file import read_model
 from wipx.recordings.source import RecordingSource
 from wipx.sim.simulator import Simulator
@@ -69,7 +70,8 @@ class Predict:
         Raises:
             InputError: the recordings are too short, or the learned acceleration is none of this robot.
         """
-        judge = Judge(simulator, sensor_noise(recordings, model.plant), HORIZON)
+        noise = sensor_noise(recordings, model.plant)
+        judge = Judge(resolving(simulator, model, recordings, noise), noise, HORIZON)
         errors, traces = judge.compare(nominal, model, recordings, held_out=True)
         if self.residual is None:
             return errors, traces

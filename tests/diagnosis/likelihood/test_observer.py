@@ -99,8 +99,8 @@ def test_gains_settle_at_the_solution_of_the_riccati_equation(kind: str):
     still = {name: np.zeros(len(t)) for name in (*model.plant.coordinates, *model.plant.commands)}
     data = RecordingBatch.of((Recording("still.csv", {"t": t, **still}),), model.plant)
     levels = NoiseLevels(np.array([0.05, 0.02])[:joints], np.array([1e-4, 3e-4])[:joints])
-    linear = linearise_along(model, data.measured[:, : data.joints])
-    (gains,) = observer_gains(linear, data, (levels,))
+    linear = linearise_along(model, data.inputs, data.measured[:, : data.joints])
+    (gains,) = observer_gains(linear, unmoved(data), data, (levels,))
     a = np.block([[np.zeros((joints, joints)), np.eye(joints)], [linear.a[0]]])
     drive = np.zeros((2 * joints, 2 * joints))
     drive[joints:, joints:] = linear.b[0] @ np.diag(levels.force**2) @ linear.b[0].T
@@ -160,13 +160,15 @@ def uneven_log(kind: str, rng: np.random.Generator) -> RecordingBatch:
 def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late: float, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     data = uneven_log(kind, rng)
-    linear = linearise_along(nominal_model(kind), data.measured[:, : data.joints])
+    linear = linearise_along(nominal_model(kind), data.inputs, data.measured[:, : data.joints])
     delays = (late,) * data.joints
     sizes = np.exp(rng.uniform(-7.0, -3.0, (3, data.joints + len(data.channels))))
     levels = [NoiseLevels(size[: data.joints], size[data.joints :]) for size in sizes]
-    for level, found in zip(levels, observer_gains(linear, data, levels, delays), strict=True):
+    roots = rng.normal(size=unmoved(data).shape) * 1e-3
+    jolts = roots @ np.swapaxes(roots, 2, 3)
+    for level, found in zip(levels, observer_gains(linear, jolts, data, levels, delays), strict=True):
         for r in range(2):
-            plain = plain_filter(linear, data, level, np.array(delays), r)
+            plain = plain_filter(linear, jolts[:, r], data, level, np.array(delays), r)
             last = int(data.inputs.last[r]) + 1
             # A first state known 1e4 times worse than the sensors costs more than half of the digits.
             scale = np.abs(plain.gains).max()
@@ -177,7 +179,14 @@ def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late
             assert not found.gains[last:, r].any()
 
 
-def plain_filter(linear: Linearisation, data: RecordingBatch, levels: NoiseLevels, late: np.ndarray, r: int) -> Gains:
+def unmoved(data: RecordingBatch) -> np.ndarray:
+    """The covariance by which coordinates move unseen within each row where every command is in the log."""
+    return np.zeros((*data.rows.shape, data.joints, data.joints))
+
+
+def plain_filter(
+    linear: Linearisation, jolts: np.ndarray, data: RecordingBatch, levels: NoiseLevels, late: np.ndarray, r: int
+) -> Gains:
     """The recursion in matrices, one row of one recording at a time."""
     joints, t = data.joints, data.inputs.t[:, r] - data.inputs.t[0, r]
     h = np.eye(2 * joints)[data.channels]
@@ -199,11 +208,12 @@ def plain_filter(linear: Linearisation, data: RecordingBatch, levels: NoiseLevel
         whitening.append(np.linalg.inv(np.linalg.cholesky(s)))
         dt = float(data.intervals[k, r]) if k < data.inputs.last[r] else 0.0
         place = linear.place[k, r]
-        transition_over(linear.a[place], dt, transition)
+        transition_over(linear.a[place], dt, transition, np.zeros((2 * joints, joints)))
         drive = linear.b[place] @ np.diag(levels.force**2) @ linear.b[place].T
         drive = drive if t[k] > SETTLES else UNSETTLED * drive
         held = np.block([[dt**3 / 3.0 * drive, dt**2 / 2.0 * drive], [dt**2 / 2.0 * drive, dt * drive]])
         p = transition @ (p - gain @ s @ gain.T) @ transition.T + held
+        p[:joints, :joints] += jolts[k]
     return Gains(np.array(gains), np.array(whitening))
 
 

@@ -18,9 +18,8 @@ from wipx.diagnosis.rules import Rules
 from wipx.diagnosis.selection.search import Search
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import low_passed, sensor_noise
+from wipx.identify.resolution import resolving
 from wipx.sim.analytic import AnalyticSimulator
-
-TREE_STEP = 2.0  # times the simulator's usual step, in which robots of many joints are followed
 
 
 @dataclass(frozen=True)
@@ -53,9 +52,9 @@ class Context:
         noise = sensor_noise(recordings, plant)
         rates = [_rate_noise(recordings, plant.rates[c - data.joints]) for c in data.channels if c >= data.joints]
         levels = NoiseLevels(np.full(data.joints, 0.01), np.array([*noise, *rates]))
-        engine = simulator if plant.tree is None else replace(simulator, step=TREE_STEP * simulator.step)
+        engine = resolving(simulator, setting.nominal, recordings, noise)
         fitter = InnovationFitter(InnovationsModel.of(engine, data, setting.nominal), rules)
-        return cls(fitter, fitter, setting, levels, Judge(simulator, noise, HORIZON), recordings)
+        return cls(fitter, fitter, setting, levels, Judge(engine, noise, HORIZON), recordings)
 
     def beside(self, search: Search) -> "Context":
         """The same for the part of a robot that a search looks at."""

@@ -104,6 +104,7 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
     n, m = 2 * joints, len(channels)
     out = np.zeros((rows, m, recordings, columns))
     transition, kept, show = np.zeros((n, n)), np.zeros((n, n)), np.zeros((m, n))
+    held, push = np.zeros((n, joints)), np.zeros(n)
     for r in range(recordings):
         states, moved = np.zeros((n, columns)), np.zeros((n, columns))
         for k in range(last[r] + 1):
@@ -114,13 +115,13 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
             if k == last[r]:
                 break
             dt, g = intervals[k, r], place[k, r]
-            transition_over(a[g], dt, transition)
+            transition_over(a[g], dt, transition, held)
             kept[:] = transition
             _add_product(kept, transition, -gains[k, r])
-            for i in range(joints):
+            push[:] = held @ b[g]
+            for i in range(n):
                 for c in range(columns):
-                    rate = dt * b[g, i] * forces[r, k, c]
-                    moved[i, c], moved[joints + i, c] = 0.5 * dt * rate, rate
+                    moved[i, c] = push[i] * forces[r, k, c]
             _add_product(moved, kept, states)
             states, moved = moved, states
     return out

@@ -11,6 +11,7 @@ from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along
+from wipx.identify.mean_commands import jolts
 from wipx.identify.sensors import true_states
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
@@ -30,18 +31,22 @@ class InnovationsModel:
     Attributes:
         simulator: The engine.
         data: The recordings.
-        linear: The nominal body about the places that they visit.
+        linear: The nominal body along them.
+        jolts: Covariance by which it moves unseen within each row, shape (K + 1, R, joints, joints).
     """
 
     simulator: AnalyticSimulator
     data: RecordingBatch
     linear: Linearisation
+    jolts: np.ndarray
     _known: dict[tuple[bytes, tuple[float, ...]], Gains] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def of(cls, simulator: AnalyticSimulator, data: RecordingBatch, nominal: Model) -> "InnovationsModel":
         """An observer of recordings whose gains are those of the nominal body."""
-        return cls(simulator, data, linearise_along(nominal, data.measured[:, : data.joints]))
+        coordinates = data.measured[:, : data.joints]
+        moved = jolts(nominal, data.recordings, data.inputs, coordinates)
+        return cls(simulator, data, linearise_along(nominal, data.inputs, coordinates), moved)
 
     def gains(self, levels: NoiseLevels, model: Model) -> Gains:
         """Gains for noise levels and for the sensor delays of a model."""
@@ -55,9 +60,8 @@ class InnovationsModel:
         known = {key: self._known.get(key) for key in keys}
         missing = {key: level for key, level in zip(keys, levels, strict=True) if known[key] is None}
         if missing:
-            fresh = dict(
-                zip(missing, observer_gains(self.linear, self.data, list(missing.values()), delays), strict=True)
-            )
+            found = observer_gains(self.linear, self.jolts, self.data, list(missing.values()), delays)
+            fresh = dict(zip(missing, found, strict=True))
             if len(self._known) > MOST_KNOWN:
                 self._known.clear()
             self._known.update(fresh)  # other threads may have cleared it meanwhile

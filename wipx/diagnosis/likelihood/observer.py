@@ -50,12 +50,17 @@ class Gains:
 
 
 def observer_gains(
-    linear: Linearisation, data: RecordingBatch, levels: Sequence[NoiseLevels], delays: tuple[float, ...] | None = None
+    linear: Linearisation,
+    jolts: np.ndarray,
+    data: RecordingBatch,
+    levels: Sequence[NoiseLevels],
+    delays: tuple[float, ...] | None = None,
 ) -> tuple[Gains, ...]:
     """Kalman gains along every recording, for each of several noise levels.
 
     Args:
         linear: The body.
+        jolts: Covariance by which coordinates move unseen within each row, shape (K + 1, R, joints, joints).
         data: The recordings.
         levels: Noise.
         delays: Delay of each coordinate's sensor [s]; None for none.
@@ -75,6 +80,7 @@ def observer_gains(
         np.array([level.sensor**2 for level in levels]),
         late,
         data.inputs.t - data.inputs.t[0],
+        jolts,
         gains,
         whitening,
     )
@@ -139,13 +145,13 @@ def _multiply_add(total, left, right, lanes):
 
 
 @cached
-def _shake(covariance, drive, dt):
-    """What white forces, held over the interval, add to the covariance."""
+def _shake(covariance, drive, jolts, dt):
+    """What white forces, held over the interval, add to the covariance, and unseen moves of the coordinates."""
     joints, _, lanes = drive.shape
     for i in range(joints):
         for j in range(joints):
             for w in range(lanes):
-                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0
+                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0 + jolts[w % len(jolts), i, j]
                 covariance[i, joints + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
                 covariance[joints + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
                 covariance[joints + i, joints + j, w] += drive[i, j, w] * dt[w]
@@ -164,10 +170,10 @@ def _combine(half, whitening, gain):
 
 
 @cached
-def _move(a, b, place, interval, force, recording, recordings, own, transition, drive, dt):
+def _move(a, b, place, interval, force, recording, recordings, own, pushed, transition, drive, dt):
     """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
     joints, n = b.shape[1], len(own)
-    transition_over(a[place], interval, own)
+    transition_over(a[place], interval, own, pushed)
     for level in range(len(force)):
         w = level * recordings + recording
         dt[w] = interval
@@ -224,7 +230,7 @@ def _store(gain, inverse, channels, exists, gains, whitening):
 
 
 @cached
-def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, gains, whitening):
+def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, jolts, gains, whitening):
     """Fill in gains (L, K + 1, R, n, n) and whitening (L, K + 1, R, m, m) of L noise levels.
 
     A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes.
@@ -235,7 +241,8 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
     covariance, work, transition = np.zeros((n, n, lanes)), np.zeros((n, n, lanes)), np.zeros((n, n, lanes))
     drive, dt, noise = np.zeros((joints, joints, lanes)), np.zeros(lanes), np.zeros(lanes)
     half, root = np.zeros((m, n, lanes)), np.zeros((m, lanes))
-    inverse, gain, own = np.zeros((m, m, lanes)), np.zeros((n, m, lanes)), np.zeros((n, n))
+    inverse, gain = np.zeros((m, m, lanes)), np.zeros((n, m, lanes))
+    own, pushed = np.zeros((n, n)), np.zeros((n, joints))
     for k in range(rows):
         _begin(covariance, sensor[:, :joints], time, k)
         for c in range(m):
@@ -250,6 +257,6 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
             break
         for r in range(recordings):
             louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
-            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, own, transition, drive, dt)
+            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, own, pushed, transition, drive, dt)
         _predict(covariance, transition, work)
-        _shake(covariance, drive, dt)
+        _shake(covariance, drive, jolts[k], dt)

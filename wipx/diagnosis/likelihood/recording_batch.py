@@ -7,6 +7,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
+from wipx.identify.mean_commands import noise_of_means
 from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
@@ -103,14 +104,13 @@ class RecordingBatch:
     def command_spread(self) -> np.ndarray:
         """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,).
 
-        The noise of the means is read off fourth differences; of n commands it is sqrt(n) times less than theirs, and
-        a triangular distribution is sqrt(6) standard deviations wide to either side.
+        The noise of n commands' mean is sqrt(n) times less than theirs, and a triangular distribution is sqrt(6)
+        standard deviations wide to either side.
         """
         found = []
         for name in self.plant.commands:
-            scaled = [np.diff(r[name], 4) * np.sqrt(r.periods - 1) for r in self.recordings]
-            deviation = 1.4826 * float(np.median(np.abs(np.concatenate(scaled)))) / np.sqrt(70.0)
-            found.append(np.sqrt(6.0) * deviation)
+            scaled = [np.sqrt(r.periods - 1) * noise_of_means(r, name) for r in self.recordings]
+            found.append(np.sqrt(6.0) * float(np.median(scaled)))
         return np.array(found)
 
     @cached_property

@@ -67,7 +67,7 @@ def left_forces(
     bandwidth = np.full(data.joints, BANDWIDTH)
     states = smoother.along(model, bandwidth)
     missing = smoother.disturbance(model, bandwidth)
-    linear = linearise_along(model, data.measured[:, : data.joints])
+    linear = linearise_along(model, data.inputs, data.measured[:, : data.joints])
     forces = np.einsum("krij,kjr->kir", np.linalg.inv(linear.b)[linear.place], missing)
     found = []
     for j, site in enumerate(plant.joints):
