@@ -53,7 +53,7 @@ def linearise_along(model: Model, inputs: Inputs, coordinates: np.ndarray) -> Li
     b = np.zeros((len(a), joints, joints))
     for j, site in enumerate(model.plant.joints):
         turning = moving.copy()
-        turning[joints + j] += 1.0
+        turning[joints + j] += np.copysign(1.0, turning[joints + j])
         free = _accelerations(probed, commands, turning)
         damped = _accelerations(probed.with_values({f"{site}/viscous.sigma": PROBE}), commands, turning)
         b[:, :, j] = ((free - damped) / (PROBE * turning[joints + j])).T
