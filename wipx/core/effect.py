@@ -168,6 +168,7 @@ class Effect:
         built_in: Parameter of joint or motor, as MuJoCo calls it, that physics engines have for it.
         linear_in: Parameters in proportion to which, counted from neutral, the effect grows at least
             roughly; empty where it has a threshold.
+        superposes: Whether what its numbers do adds up, so that one regression finds first guesses of all.
         scan: Name of its first guesses in `wipx.diagnosis.candidates.screening`; the grids of its parameters where
             empty.
         non_smooth: Why slopes of its likelihood mislead; None where they do not.
@@ -203,6 +204,7 @@ class Effect:
     begins: str = ""
     built_in: str = ""
     linear_in: tuple[str, ...] = ()
+    superposes: bool = False
     scan: str = ""
     non_smooth: NonSmooth | None = None
     doubt: float = 0.0

@@ -15,6 +15,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
 from wipx.diagnosis.candidates.backlash_scan import plays
 from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
+from wipx.diagnosis.candidates.point_mass_scan import point_masses
 from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Setting
@@ -33,6 +34,7 @@ SCANS: dict[str, Scan] = {
     "force_limits": saturations,
     "speed_limits": speed_limits,
     "gaps": plays,
+    "point_masses": point_masses,
 }  # first guesses that take more than a grid, by `Effect.scan`
 LOUD = (saturations, speed_limits, plays)  # of effects without which an observer asks a joint for much force
 
@@ -122,6 +124,8 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
         if scan is None
         else _scanned(scan, fitter, fit, name)
     )
+    if effect.superposes:
+        return [_regressed(fitter, setting, fit, name, basis, left)]
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
     low, high = _bounds(setting, name, effect)
@@ -143,6 +147,27 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
             start = dict(zip(names, values.tolist(), strict=True))
             found.append(Candidate(name, float(gain), start, float(estimate), float(deviation)))
     return found
+
+
+def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.ndarray, left: np.ndarray) -> Candidate:
+    """Where to start for an effect whose numbers add up: their regression on what is left, (R m (K + 1),).
+
+    Numbers of which the recordings tell nothing stay neutral: none is likely to be more than `FURTHEST` doses.
+    """
+    effect = vocabulary(setting.nominal.plant)[name]
+    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+    steps = perturbations(effect, setting.scales[name.partition("/")[0]])[0]
+    neutral = np.array([p.neutral for p in effect.parameters])
+    model = fit.hypothesis.model.with_effects({name: effect.neutral})
+    change = fitter.white_of(fit, ModelBatch(model, names, neutral + np.diag(steps))) - fit.white.ravel()
+    change -= (change @ basis) @ basis.T
+    covariance = np.linalg.inv(change @ change.T + np.eye(len(steps)) / FURTHEST**2)
+    slope = change @ left
+    amounts = np.clip(-covariance @ slope, -FURTHEST, FURTHEST)
+    values = np.clip(neutral + amounts * steps, *_bounds(setting, name, effect))
+    gain = -amounts @ slope - 0.5 * np.sum((amounts @ change) ** 2)
+    start = dict(zip(names, values.tolist(), strict=True))
+    return Candidate(name, float(gain), start, float(values[0]), float(steps[0] * np.sqrt(covariance[0, 0])))
 
 
 def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:

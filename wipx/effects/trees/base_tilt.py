@@ -13,5 +13,6 @@ EFFECT = Effect(
     ),
     law="gravity in the base's frame is R' g, R = Ry(pitch) Rx(roll)",
     linear_in=("roll", "pitch"),
+    superposes=True,
     source="rigid-body mechanics",
 )

@@ -13,5 +13,6 @@ EFFECT = Effect(
     ),
     law="c + (x, y, z), the inertia about the centre of mass as it is",
     linear_in=("x", "y", "z"),
+    superposes=True,
     source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
 )

@@ -16,5 +16,6 @@ EFFECT = Effect(
     ),
     law="m + mass; centre of mass and inertia with a point mass at (x, y, z)",
     linear_in=("mass",),
+    scan="point_masses",
     source="Atkeson, An, Hollerbach 1986, Estimation of inertial parameters, IJRR 5(3)",
 )

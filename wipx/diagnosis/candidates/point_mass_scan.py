@@ -1,0 +1,46 @@
+"""First guesses of a payload on a link: how heavy it is, and where.
+
+A point mass m at r changes a link's mass by m, its first moment by m r and its second moments by m r r', and the motion
+in proportion to these (Atkeson, An, Hollerbach 1986, IJRR 5(3)). A regression on what innovations leave over finds the
+first moment, beside any change of mass and of second moments; several masses with that moment are then tried.
+"""
+
+import numpy as np
+
+from wipx.core.model import ModelBatch
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.effects.catalogue import effect_of
+
+SMALL = 0.05  # of the link's mass
+ARM = 0.1  # [m] of the simulated masses
+USUAL = 5.0  # standard deviation of each number, in multiples of those simulated: unseen ones stay zero
+DISTANCES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)  # [m] of the masses that are tried
+
+
+def point_masses(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, name: str) -> np.ndarray:
+    """Mass [kg] and place [m] in the link's frame of likely payloads, shape (A, 4).
+
+    Args:
+        fitter: Of the fit.
+        fit: What is already explained.
+        basis: What small changes of the fit's numbers make of its white innovations, orthonormal.
+        name: Of the payload, "link_LINK/payload".
+    """
+    model = fit.hypothesis.model
+    effect = effect_of(name, model.plant)
+    small = SMALL * model.parameters[f"{name.partition('/')[0].removeprefix('link_')}.mass"]
+    places = ARM * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    probes = np.column_stack([np.full(len(places), small), places])
+    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+    base = fit.white.ravel()
+    change = fitter.white_of(fit, ModelBatch(model.with_effects({name: effect.neutral}), names, probes)) - base
+    middle, ahead, behind = change[:1], change[1:4], change[4:]
+    columns = np.concatenate([middle, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - middle])
+    columns -= (columns @ basis) @ basis.T
+    amounts = -np.linalg.solve(columns @ columns.T + np.eye(len(columns)) / USUAL**2, columns @ base)
+    moment = amounts[1:4] * small * ARM
+    masses = [float(np.linalg.norm(moment)) / distance for distance in DISTANCES]
+    if amounts[0] > 0.0:
+        masses.append(float(amounts[0] * small))
+    return np.array([[mass, *(moment / mass)] for mass in masses if mass > 0.0]).reshape(-1, 4)
