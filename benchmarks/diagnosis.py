@@ -40,13 +40,14 @@ def measure_diagnosis() -> dict[str, float]:
     hypothesis = Hypothesis.of(Setting(nominal, {}, scales_of(nominal, recordings)), (), {})
     forces = 0.01 * np.exp(np.linspace(-2.0, 2.0, LEVELS))
     levels = [NoiseLevels(np.full(2, force), np.array(list(NOISE.values()))) for force in forces]
-    gains = observer_gains(fitter.innovations_model.linear, data, levels)
+    body = fitter.innovations_model.linear, fitter.innovations_model.jolts
+    gains = observer_gains(*body, data, levels)
     batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], LEVELS, axis=0))
     follow = (batch, gains, np.arange(LEVELS), np.zeros(LEVELS))
     innovations = fitter.innovations_model.innovations(*follow)
     parts = interleaved(
         {
-            "gains": lambda: observer_gains(fitter.innovations_model.linear, data, levels),
+            "gains": lambda: observer_gains(*body, data, levels),
             "simulation, innovations": lambda: fitter.innovations_model.innovations(*follow),
             "colours": lambda: [noise_model_of(each, data) for each in innovations],
         },
