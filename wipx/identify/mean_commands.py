@@ -9,7 +9,9 @@ from wipx.sim.inputs import Inputs
 
 
 def noise_of_means(recording: Recording, command: str) -> float:
-    """Standard deviation of white noise of a logged command, read off fourth differences [N or N m]."""
+    """Standard deviation of white noise of a logged command, read off fourth differences [N or N m]; else zero."""
+    if len(recording) < 5:
+        return 0.0
     return 1.4826 * float(np.median(np.abs(np.diff(recording[command], 4)))) / np.sqrt(70.0)
 
 
