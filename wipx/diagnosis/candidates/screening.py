@@ -116,6 +116,8 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     base = fit.white.ravel()
     basis = basis_of(fit)
     left = base - basis @ (basis.T @ base)
+    if effect.superposes:
+        return [_regressed(fitter, setting, fit, name, basis, left)]
     scan = SCANS[effect.scan] if effect.scan else None
     if scan in LOUD and setting.nominal.plant.tree is not None and _is_quiet(fitter, setting, fit, name):
         return []
@@ -124,8 +126,6 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
         if scan is None
         else _scanned(scan, fitter, fit, name)
     )
-    if effect.superposes:
-        return [_regressed(fitter, setting, fit, name, basis, left)]
     grown = np.array([p.name in effect.linear_in for p in effect.parameters])
     neutral = np.array([p.neutral for p in effect.parameters])
     low, high = _bounds(setting, name, effect)
