@@ -35,18 +35,20 @@ class Signals:
     slides: np.ndarray
 
 
-def signals_of(model: Model, motions: Sequence[Motion]) -> Signals:
+def signals_of(model: Model, motions: Sequence[Motion], kept: Sequence[slice] | None = None) -> Signals:
     """Kept rows of smoothed recordings; forces pass the same filter as positions.
 
     Args:
         model: Whose drives act; only gains of torque drives, stiffness, damping and limits of position drives count.
         motions: Smoothed recordings.
+        kept: Rows of each of them; None for those that a fit uses.
     """
-    parts = [_signals(model, motion) for motion in motions]
+    kept = kept or [motion.kept for motion in motions]
+    parts = [_signals(model, motion, rows) for motion, rows in zip(motions, kept, strict=True)]
     return Signals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def _signals(model: Model, motion: Motion) -> tuple[np.ndarray, ...]:
+def _signals(model: Model, motion: Motion, kept: slice) -> tuple[np.ndarray, ...]:
     plant = model.plant
     forces, commands = np.zeros_like(motion.coordinates), motion.commands()
     for i, site in enumerate(plant.actuated):
@@ -59,7 +61,7 @@ def _signals(model: Model, motion: Motion) -> tuple[np.ndarray, ...]:
             forces[:, j] = model.parameters[f"{site}.gain"] * commands[:, i]
     slides = motion.filtered(np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0))
     parts = (motion.coordinates, motion.rates, motion.accelerations, motion.filtered(forces), slides)
-    return tuple(part[motion.kept] for part in parts)
+    return tuple(part[kept] for part in parts)
 
 
 def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
@@ -82,6 +84,25 @@ def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
         velocity = E.bias(tree, poses, list(v), own, pull)
         for j in range(len(q)):
             found[:, j, column] = np.asarray(inertial[j] + velocity[j], dtype=float)
+    return found
+
+
+def gravity_regressor(tree: Tree, signals: Signals, inertial: np.ndarray) -> np.ndarray:
+    """Forces of the joints per unit of each component of gravity in the frame of the base, shape (rows, joints, 3).
+
+    Args:
+        tree: Links and joints.
+        signals: Motion.
+        inertial: Inertial numbers of all links, shape (10 N,).
+    """
+    q = signals.coordinates.T
+    poses = [E.pose(link, q[i], np.sin(q[i]), np.cos(q[i])) for i, link in enumerate(tree.links)]
+    own = [_inertia(each) for each in inertial.reshape(-1, E.NUMBERS)]
+    found = np.zeros((q.shape[1], len(q), 3))
+    for axis in range(3):
+        x, y, z = np.eye(3)[axis].tolist()
+        for j, force in enumerate(E.bias(tree, poses, [0.0] * len(q), own, (x, y, z))):
+            found[:, j, axis] = np.asarray(force, dtype=float)
     return found
 
 

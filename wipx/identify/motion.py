@@ -71,19 +71,22 @@ def smooth(values: np.ndarray, width: float, order: int = 0) -> np.ndarray:
     return gaussian_filter1d(values, width, axis=0, order=order, mode="nearest", truncate=REACH)
 
 
-def motions(recordings: tuple[Recording, ...], plant: Plant, noise: np.ndarray) -> tuple[Motion, ...]:
+def motions(
+    recordings: tuple[Recording, ...], plant: Plant, noise: np.ndarray, *, wider: float = 1.0
+) -> tuple[Motion, ...]:
     """Smooth recordings, all with the same filter.
 
     Args:
         recordings: What to smooth.
         plant: Says which columns are coordinates and commands.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
+        wider: Width of the filter over that of the narrowest one that suits the noise.
     """
     row = float(np.median(np.concatenate([np.diff(r.t) for r in recordings])))
     step = max(row, FINEST)
     noise = noise * np.sqrt(row / step)
     grids = [_grid(r, plant, step) for r in recordings]
-    width = _width([q for _, q in grids], step, noise)
+    width = wider * _width([q for _, q in grids], step, noise)
     rest_speeds = RESTING * noise * _leak(width, 1) / step
     smoothed = []
     for recording, (t, q) in zip(recordings, grids, strict=True):

@@ -1,230 +1,239 @@
-"""What recorded forces say of a robot of many joints: laws of each joint, its drive and its link, by least squares.
+"""What recorded forces say of a robot of many joints: laws of joints, drives and links, by least squares.
 
-The equation of motion of one joint holds its own friction and drive beside the recorded motion of all: what other
-joints lack does not enter, except that a link is felt by all joints that carry it. So joints are looked at one by one,
-from the tips to the base, as in the identification of industrial robots (Swevers, Verdonck, De Schutter 2007, IEEE CSM
-27(5)). A search begins with the effects that are asked for here. Where no law holds exactly, the numbers are priors of
-what is fitted to predictions.
+The equations of motion of all joints hold together, each with a noise of its own, as in the identification of
+industrial robots (Swevers, Verdonck, De Schutter 2007, IEEE CSM 27(5)). What a joint lacks and no law explains yet
+counts as its noise. Effects are chosen one by one; one that is chosen may make several others superfluous. A search
+begins with the effects that are asked for here. Where no law holds exactly, the numbers are priors of what is fitted to
+predictions.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import least_squares
 
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.core.tree import Link
+from wipx.diagnosis.candidates.force_laws import ForceColumns, ForceLaw, force_laws
 from wipx.diagnosis.likelihood.hypothesis import ByForces
 from wipx.effects.catalogue import vocabulary
-from wipx.identify.inverse_dynamics import Signals, missing, numbers, regressor, signals_of, weight_of
+from wipx.identify.inverse_dynamics import missing, signals_of
 from wipx.identify.motion import independent_rows, motions
 from wipx.identify.noise import sensor_noise
 
-SHIFT = 1e-3  # [m], over which slopes by a centre of mass are taken
 ALIKE = 1e-9  # relative, of the normal equations of columns that are nearly alike
-MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
-
-
-@dataclass(frozen=True)
-class Law:
-    """What an effect takes from the force of its joint.
-
-    Attributes:
-        columns: Force per unit of each of its sizes, shape (rows, C).
-        numbers: Its numbers by symbol [SI], from the sizes.
-        measured: Symbol of the number that the first size is; empty for none.
-        least: Lower bound of the first size; the others have none.
-        usual: Standard deviation of the sizes beforehand; None where any is as likely.
-        contains: Effect that it has as a special case; empty for none.
-    """
-
-    columns: np.ndarray
-    numbers: Callable[[np.ndarray], dict[str, float]]
-    measured: str = ""
-    least: float = 0.0
-    usual: float | None = None
-    contains: str = ""
-
-    @property
-    def count(self) -> int:
-        """Number of sizes."""
-        return self.columns.shape[1]
+STARTS = 2  # from which a law is fitted
+TRIALS = 40  # evaluations of a fit at most
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Laws that are fitted to the force of a joint.
+    """Laws that are fitted to the forces of all joints.
 
     Attributes:
-        left: Force that they leave, shape (rows,).
-        sizes: Of each law.
-        deviations: Standard deviation of the first size of each law.
-        surprise: Of the sizes beforehand, half the sum of their squares in standard deviations.
+        numbers: What is fitted of each law, by effect.
+        sizes: Of all columns, shape (C,).
+        likelihood: Log-likelihood of the forces that are left, and of the numbers beforehand, up to a constant [nats].
+        penalty: For its numbers (Schwarz 1978) [nats].
     """
 
-    left: np.ndarray
-    sizes: dict[str, np.ndarray] = field(default_factory=dict)
-    deviations: dict[str, float] = field(default_factory=dict)
-    surprise: float = 0.0
+    numbers: Mapping[str, np.ndarray]
+    sizes: np.ndarray
+    likelihood: float
+    penalty: float
 
     @property
-    def rows(self) -> float:
-        """Number of rows of what is left that are independent."""
-        return max(independent_rows(self.left[:, None]), 2.0)
+    def score(self) -> float:
+        """Penalised log-likelihood [nats]."""
+        return self.likelihood - self.penalty
 
-    def score(self, rows: float) -> float:
-        """Penalised log-likelihood (Schwarz 1978) of so many independent rows, up to a constant [nats]."""
-        count = sum(map(len, self.sizes.values()))
-        power = max(float(np.mean(self.left**2)), 1e-300)
-        return -0.5 * rows * np.log(power) - self.surprise - 0.5 * count * np.log(rows)
+
+class Regression:
+    """Least squares on the forces of all joints at once.
+
+    What a fit leaves of the force of a joint, `noise` of that joint, counts for the next ones as its noise.
+    """
+
+    def __init__(self, lacking: np.ndarray, columns: ForceColumns, laws: Mapping[str, ForceLaw]) -> None:
+        """Of forces that the motion needs and the model does not give, shape (rows, joints)."""
+        self.laws, self._lacking, self._columns = laws, lacking, columns
+        both = (np.column_stack([lacking[:, j], columns.of_joint(j)]) for j in range(lacking.shape[1]))
+        self._grams = np.stack([each.T @ each / len(each) for each in both])
+        self._noise_of(np.zeros(columns.count))
+
+    def beside(self, fit: Fitted) -> Fitted:
+        """Let what a fit leaves count as noise, and judge the fit by that."""
+        self._noise_of(fit.sizes)
+        return self._judged(fit.numbers, fit.sizes)
+
+    def fit(self, start: Mapping[str, np.ndarray]) -> Fitted:
+        """The likeliest numbers of some effects within their bounds, from a start on."""
+        if not start:
+            return self._judged({}, np.zeros(self._columns.count))
+        laws = [self.laws[effect] for effect in start]
+        low = np.concatenate([law.low for law in laws])
+        sure = 1.0 / np.concatenate([law.usual for law in laws])
+        ends = np.cumsum([law.count for law in laws])[:-1]
+
+        def errors(fitted: np.ndarray) -> np.ndarray:
+            left = self._root[:, 0].copy()
+            for law, own in zip(laws, np.split(fitted, ends), strict=True):
+                left += self._root[:, 1 + law.columns] @ law.sizes(own)
+            return np.concatenate([left, sure * fitted])
+
+        def slopes(fitted: np.ndarray) -> np.ndarray:
+            parts = zip(laws, np.split(fitted, ends), strict=True)
+            of_left = [self._root[:, 1 + law.columns] @ law.slopes(own) for law, own in parts]
+            return np.concatenate([np.concatenate(of_left, axis=1), np.diag(sure)])
+
+        begin = np.maximum(np.concatenate(list(start.values())), low + 1e-12)
+        best = least_squares(errors, begin, slopes, (low, np.inf), x_scale="jac", max_nfev=TRIALS).x  # pyright: ignore
+        numbers = dict(zip(start, np.split(best, ends), strict=True))
+        return self._judged(numbers, self._sizes(numbers))
+
+    def at_most(self, effects: Sequence[str]) -> tuple[np.ndarray, float]:
+        """Sizes of the columns of some effects, whatever their laws, and the score of a fit that would reach them."""
+        taken = np.unique(np.concatenate([self.laws[effect].columns for effect in effects]))
+        own = self._root[:, 1 + taken]
+        scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+        held = np.concatenate([own / scale, np.sqrt(ALIKE) * np.eye(len(taken))])
+        sizes = np.zeros(self._columns.count)
+        sizes[taken] = np.linalg.lstsq(held, np.concatenate([-self._root[:, 0], np.zeros(len(taken))]))[0] / scale
+        return sizes, self._likelihood(sizes) - self._penalty(effects)
+
+    def starts_with(self, fit: Fitted, effect: str) -> list[dict[str, np.ndarray]]:
+        """Where a fit with one effect more may start, the best first; without what it contains or is contained in."""
+        kept = self._beside(fit, effect)
+        law = self.laws[effect]
+        sizes, _ = self.at_most([*kept, effect])
+        starts = [{**kept, effect: start} for start in law.starts(sizes[law.columns])]
+        return sorted(starts, key=lambda start: -self._likelihood(self._sizes(start)))
+
+    def most_with(self, fit: Fitted, effect: str) -> float:
+        """Score that a fit with one effect more reaches at most."""
+        return self.at_most([*self._beside(fit, effect), effect])[1]
+
+    def deviation(self, fit: Fitted, effect: str) -> float:
+        """Standard deviation of the first number of an effect that the fit has; infinite where no row shows it."""
+        laws = [self.laws[name] for name in fit.numbers]
+        parts = zip(laws, fit.numbers.values(), strict=True)
+        slopes = np.concatenate([self._root[:, 1 + law.columns] @ law.slopes(own) for law, own in parts], axis=1)
+        first = sum(self.laws[name].count for name in list(fit.numbers)[: list(fit.numbers).index(effect)])
+        size = np.linalg.norm(slopes, axis=0)
+        if size[first] == 0.0:
+            return np.inf
+        scaled = slopes / np.where(size > 0.0, size, 1.0)
+        inverse = np.linalg.inv(scaled.T @ scaled + ALIKE * np.eye(len(size)))
+        return float(np.sqrt(inverse[first, first]) / size[first])
+
+    def _beside(self, fit: Fitted, effect: str) -> dict[str, np.ndarray]:
+        apart = (effect, self.laws[effect].contains)
+        return {n: own for n, own in fit.numbers.items() if n not in apart and self.laws[n].contains != effect}
+
+    def _noise_of(self, sizes: np.ndarray) -> None:
+        left = self._lacking + self._columns.forces(sizes)
+        self._rows = np.array([max(independent_rows(each[:, None]), 2.0) for each in left.T])
+        powers = self._powers(sizes)
+        weights = np.where(powers > 0.0, self._rows / np.maximum(powers, 1e-300), 0.0)
+        values, vectors = np.linalg.eigh(np.tensordot(weights, self._grams, 1))
+        self._root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # (C + 1, C + 1)
+
+    def _judged(self, numbers: Mapping[str, np.ndarray], sizes: np.ndarray) -> Fitted:
+        surprise = sum(0.5 * float(np.sum((own / self.laws[name].usual) ** 2)) for name, own in numbers.items())
+        return Fitted(numbers, sizes, self._likelihood(sizes) - surprise, self._penalty(numbers))
+
+    def _likelihood(self, sizes: np.ndarray) -> float:
+        return -0.5 * float(self._rows @ np.log(np.maximum(self._powers(sizes), 1e-300)))
+
+    def _penalty(self, effects: Iterable[str]) -> float:
+        return 0.5 * sum(self.laws[effect].count for effect in effects) * float(np.log(self._rows.sum()))
+
+    def _sizes(self, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
+        sizes = np.zeros(self._columns.count)
+        for effect, own in numbers.items():
+            sizes[self.laws[effect].columns] += self.laws[effect].sizes(own)
+        return sizes
+
+    def _powers(self, sizes: np.ndarray) -> np.ndarray:
+        """Mean square of the force that is left at each joint, shape (joints,)."""
+        whole = np.concatenate([[1.0], sizes])
+        used = np.flatnonzero(whole)
+        return np.einsum("jab,a,b->j", self._grams[:, used][:, :, used], whole[used], whole[used])
 
 
 def numbers_by_forces(model: Model, recordings: Sequence[Recording]) -> dict[str, ByForces]:
-    """Numbers of effects of joints, drives and links, by "site/kind.symbol", as recorded forces have them.
+    """Numbers of effects of joints, drives, links and base, by "site/kind.symbol", as recorded forces have them.
 
-    Of effects that are not asked for, the number that they would have beside the others.
+    Of effects of one joint that are not asked for, the number that they would have beside the others. Effects that no
+    row would show are left out.
 
     Args:
         model: A robot from a model file, as its owner believes it to be.
         recordings: Of it.
     """
-    tree = model.plant.tree
-    assert tree is not None
-    smoothed = motions(tuple(recordings), model.plant, sensor_noise(tuple(recordings), model.plant))
-    signals = signals_of(model, smoothed)
-    carried = regressor(tree, signals, weight_of(model))
-    lacking = missing(model, signals, carried)
+    lacking, columns = _forces(model, tuple(recordings))
     known = vocabulary(model.plant).keys() - model.effects.keys()
-    longest = max(float(np.linalg.norm(link.place)) for link in tree.links)
+    shown = np.flatnonzero(columns.sizes)
+    laws = {n: law for n, law in force_laws(model).items() if n in known and np.isin(law.columns, shown).any()}
+    regression = Regression(lacking, columns, laws)
+    chosen = _selected(regression)
     found: dict[str, ByForces] = {}
-    for j, link in reversed(list(enumerate(tree.links))):
-        laws = _laws(signals, j, link.joint)
-        shifted = np.zeros((*lacking.shape, 2))
-        if link.mass:
-            shifted = carried @ _centre_shifts(model, link)  # (rows, joints, 2)
-            laws[_off_centre(link)] = Law(
-                shifted[:, j],
-                lambda sizes, link=link: _place(sizes @ _across(link)),
-                least=-np.inf,
-                usual=MISPLACED * longest,
-            )
-        laws = {name: law for name, law in laws.items() if name in known}
-        chosen = _selected(lacking[:, j], laws)
-        for name, law in laws.items():
-            own = chosen if name in chosen.sizes else _fitted(lacking[:, j], laws, _with(chosen, name, laws), chosen)
-            for symbol, value in law.numbers(own.sizes[name]).items():
-                deviation = own.deviations[name] if symbol == law.measured else np.inf
-                found[f"{name}.{symbol}"] = ByForces(value, deviation, asked=own is chosen)
-        lacking = lacking + shifted @ chosen.sizes.get(_off_centre(link), np.zeros(2))
+    for name, law in laws.items():
+        asked = name in chosen.numbers
+        if not asked and not law.measured:
+            continue
+        fit = chosen if asked else regression.fit(regression.starts_with(chosen, name)[0])
+        for symbol, value in law.numbers(fit.numbers[name]).items():
+            deviation = regression.deviation(fit, name) if symbol == law.measured else np.inf
+            found[f"{name}.{symbol}"] = ByForces(value, deviation, asked=asked)
     return found
 
 
-def _off_centre(link: Link) -> str:
-    return f"link_{link.body}/com_offset"
+def _forces(model: Model, recordings: tuple[Recording, ...]) -> tuple[np.ndarray, ForceColumns]:
+    """Forces that the motion needs and the model does not give, shape (rows, joints), and what may add to them.
 
-
-def _across(link: Link) -> np.ndarray:
-    """Two directions across the axis of a link's joint, in the body's frame, shape (2, 3): along it no force shows."""
-    return link.body_rotation[:2]
-
-
-def _centre_shifts(model: Model, link: Link) -> np.ndarray:
-    """Change of all inertial numbers per shift of a link's centre of mass across its joint, shape (10 N, 2)."""
-    effect = _off_centre(link)
-    own = model.effects.get(effect, _place(np.zeros(3)))
-    here = np.array([own[axis] for axis in "xyz"])
-    moved = [numbers(model.with_effects({effect: _place(here + SHIFT * each)})) for each in _across(link)]
-    return np.stack([(each - numbers(model)) / SHIFT for each in moved], axis=1)
-
-
-def _place(where: np.ndarray) -> dict[str, float]:
-    return dict(zip("xyz", where.tolist(), strict=True))
-
-
-def _laws(signals: Signals, j: int, site: str) -> dict[str, Law]:
-    """The laws of joint j and its drive.
-
-    A wrong gain is not among them: least squares takes dry friction, most of the force of a slow joint, for one.
+    Products of smoothed signals are not the smoothed products: they err by the square of the filter's width. So they
+    are extrapolated to no width from two of them (Richardson 1911).
     """
-    constant = np.ones(len(signals.rates))
-    offset = f"actuator_{site}/offset"
-    return {
-        f"{site}/coulomb": _proportional("F_c", signals.slides[:, j]),
-        f"{site}/viscous": _proportional("sigma", signals.rates[:, j]),
-        f"{site}/rotor_inertia": _proportional("J", signals.accelerations[:, j]),
-        offset: _proportional("F_0", -constant, -np.inf),
-        f"{site}/spring": Law(
-            np.stack([signals.coordinates[:, j], -constant], axis=1),
-            lambda sizes: {"k": float(sizes[0]), "q0": float(sizes[1] / max(sizes[0], 1e-300))},
-            measured="k",
-            contains=offset,
-        ),
-    }
+    noise = sensor_noise(recordings, model.plant)
+    narrow, wide = (motions(recordings, model.plant, noise, wider=width) for width in (1.0, np.sqrt(2.0)))
+    kept = [motion.kept for motion in wide]
+    signals = [signals_of(model, each, kept) for each in (narrow, wide)]
+    columns = [ForceColumns.of(model, each) for each in signals]
+    lacking = [missing(model, *both) for both in zip(signals, (each.inertial for each in columns), strict=True)]
+    return 2.0 * lacking[0] - lacking[1], columns[0].extrapolated(columns[1])
 
 
-def _proportional(symbol: str, force: np.ndarray, least: float = 0.0) -> Law:
-    """A law of one number to which its force (rows,) is proportional."""
-    return Law(force[:, None], lambda sizes: {symbol: float(sizes[0])}, symbol, least)
-
-
-def _selected(lacking: np.ndarray, laws: Mapping[str, Law]) -> Fitted:
-    """The effects that least squares chooses one by one, as long as each is worth its penalty.
-
-    Args:
-        lacking: Force that the joint needs and is not given, shape (rows,).
-        laws: Of the effects.
-    """
-    chosen = Fitted(lacking)
+def _selected(regression: Regression) -> Fitted:
+    """The effects that are chosen one by one, as long as each is worth its penalty."""
+    chosen = regression.fit({})
     while True:
-        contained = {laws[name].contains for name in chosen.sizes}
-        more = [name for name in laws if name not in chosen.sizes and name not in contained]
-        trials = [_fitted(lacking, laws, _with(chosen, name, laws), chosen) for name in more]
-        rows = chosen.rows
-        best = max(trials, key=lambda trial: trial.score(rows), default=chosen)
-        if best.score(rows) <= chosen.score(rows):
+        chosen = regression.beside(chosen)
+        better = _with_one_more(regression, chosen)
+        if better is chosen:
             return chosen
-        chosen = best
+        chosen = _pruned(regression, better)
 
 
-def _with(chosen: Fitted, added: str, laws: Mapping[str, Law]) -> list[str]:
-    """The chosen effects and one more, without those that it contains or that contain it."""
-    apart = (added, laws[added].contains)
-    return [*(name for name in chosen.sizes if name not in apart and laws[name].contains != added), added]
+def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
+    """The best fit with one effect more; the same where none is worth it."""
+    contained = {regression.laws[name].contains for name in chosen.numbers}
+    more = [name for name in regression.laws if name not in chosen.numbers and name not in contained]
+    most = {name: regression.most_with(chosen, name) for name in more}
+    best = chosen
+    for name in sorted(more, key=lambda name: -most[name]):
+        if most[name] <= best.score:
+            break
+        trials = [regression.fit(start) for start in regression.starts_with(chosen, name)[:STARTS]]
+        best = max((best, *trials), key=lambda fit: fit.score)
+    return best
 
 
-def _fitted(lacking: np.ndarray, laws: Mapping[str, Law], names: list[str], before: Fitted) -> Fitted:
-    """The likeliest sizes of some effects within their bounds.
-
-    Args:
-        lacking: Force that the joint needs and is not given, shape (rows,).
-        laws: Of the effects.
-        names: Of those that are fitted.
-        before: A fit of fewer effects: what it leaves counts as noise.
-    """
-    noise = float(np.sum(before.left**2)) / before.rows  # rows that are not independent count together
-    own = np.concatenate([laws[name].columns for name in names], axis=1)
-    low = np.concatenate([[laws[name].least, *[-np.inf] * (laws[name].count - 1)] for name in names])
-    sure = np.concatenate([np.full(laws[name].count, 1.0 / (laws[name].usual or np.inf)) for name in names])
-    beforehand = np.sqrt(noise) * np.diag(sure)
-    sizes = lsq_linear(np.concatenate([own, beforehand]), np.concatenate([-lacking, 0.0 * sure]), (low, np.inf)).x
-    left = lacking + own @ sizes
-    first = np.cumsum([0, *(laws[name].count for name in names)])
-    spread = _deviations(own.T @ own + beforehand**2, noise)
-    return Fitted(
-        left,
-        dict(zip(names, np.split(sizes, first[1:-1]), strict=True)),
-        dict(zip(names, spread[first[:-1]].tolist(), strict=True)),
-        0.5 * float(np.sum((sure * sizes) ** 2)),
-    )
-
-
-def _deviations(normal: np.ndarray, noise: float) -> np.ndarray:
-    """Standard deviations by the normal equations (D, D); infinite for what no row shows, shape (D,)."""
-    size = np.sqrt(np.diag(normal))
-    shown = size > 0.0
-    found = np.full(len(size), np.inf)
-    scaled = normal[np.ix_(shown, shown)] / np.outer(size[shown], size[shown])
-    found[shown] = np.sqrt(noise * np.diag(np.linalg.inv(scaled + ALIKE * np.eye(len(scaled))))) / size[shown]
-    return found
+def _pruned(regression: Regression, chosen: Fitted) -> Fitted:
+    """Without the effects that the latest one has made superfluous."""
+    for name in list(chosen.numbers)[:-1]:
+        smaller = regression.fit({other: own for other, own in chosen.numbers.items() if other != name})
+        if smaller.score >= chosen.score:
+            return _pruned(regression, smaller)
+    return chosen

@@ -106,13 +106,13 @@ class Fitter(ABC):
         considered: Effects that are fitted in each step of a search, at most.
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
-        sweeps: Searches of each part of a robot of many joints, at most.
+        exchanges: Times that parts of a robot of many joints exchange their effects for better ones, at most.
     """
 
     considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
-    sweeps: ClassVar[int]
+    exchanges: ClassVar[int]
 
     @property
     @abstractmethod

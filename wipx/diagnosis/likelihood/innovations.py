@@ -43,7 +43,7 @@ class InnovationFitter(Fitter):
     considered = 6
     steps = 5
     close_call = 60.0
-    sweeps = 4
+    exchanges = 2
 
     innovations_model: InnovationsModel
     rules: Rules = USUAL

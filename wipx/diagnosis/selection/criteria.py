@@ -55,6 +55,13 @@ class Criteria:
         overstated = inflation(larger, indices)
         return float(overstated * (penalty + self.fitter.required_beyond_penalty(smaller, larger, explained)))
 
+    def most_required(self, fit: Fit, effect: str) -> float:
+        """Evidence that an effect of a fit must gain beside the others, at most [nats]."""
+        indices = fit.hypothesis.parameters_of(effect)
+        penalty = 0.5 * len(indices) * np.log(fit.rows)
+        explained = max(evidence(self.nominal, fit), 0.0)
+        return float(inflation(fit, indices) * (penalty + self.fitter.required_beyond_penalty(fit, fit, explained)))
+
     def score_lead(self, fit: Fit, other: Fit) -> float:
         """Penalised evidence that a fit has beyond another one [nats]."""
         return score(fit, self.nominal) - score(other, self.nominal)

@@ -4,11 +4,12 @@ On an arm every joint has friction. Effects of different joints hardly compete: 
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
 whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
-for (`torque_regression`). When parts have changed, all numbers are fitted together, and effects that those of other
-parts make superfluous are dropped; parts that may have more to find are searched again.
+for (`torque_regression`). Then each part gets one effect at a time: all numbers are fitted together before the next one
+is looked for, and effects that others make superfluous are dropped. At the end the parts exchange effects for better
+ones.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,7 +21,7 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.search import Chosen, ConsideredEffect, History, Search
+from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, Search
 from wipx.effects.catalogue import effect_of
 
 TRIED = 3  # weakest effects of the whole robot, without which it is fitted
@@ -82,24 +83,8 @@ def _site(effect: str) -> str:
     return effect.partition("/")[0]
 
 
-@dataclass(frozen=True)
-class SearchedPart:
-    """A part of a robot after its search.
-
-    Attributes:
-        sites: The part.
-        begun: The fit where the search began.
-        chosen: What it chose.
-    """
-
-    sites: frozenset[str]
-    begun: Fit
-    chosen: Chosen
-
-    @property
-    def has_changed(self) -> bool:
-        """Whether its effects are others than before."""
-        return set(self.chosen.fit.effects) != set(self.begun.effects)
+def _effects_at(fit: Fit, sites: frozenset[str]) -> tuple[str, ...]:
+    return tuple(effect for effect in fit.effects if _site(effect) in sites)
 
 
 def _side_by_side(parts: Sequence[frozenset[str]]) -> list[Sequence[frozenset[str]]]:
@@ -122,7 +107,7 @@ class PartSearch(Search):
 class RobotSearch(Search):
     """The search for the missing effects of a robot, part by part."""
 
-    _known: dict[tuple[int, frozenset[str]], tuple[Fit, Search, Fit]] = field(
+    _known: dict[tuple[int, frozenset[str]], tuple[Fit, FitStore, Fit]] = field(
         default_factory=dict, compare=False, repr=False
     )
 
@@ -142,52 +127,54 @@ class RobotSearch(Search):
 
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
-        whole: Fit = begin or self.begun()
-        considered: History = ()
-        waiting = self._order(whole)
-        for sweep in range(self.store.fitter.sweeps):
-            held, changed = Held.of(whole), []
-            for parts in _side_by_side(waiting):
-                searched = self._searched(held, parts, again=sweep > 0)
-                considered += tuple(each for part in searched for each in part.chosen.considered)
-                new = [part for part in searched if part.has_changed]
-                for part in new:
-                    held = held.with_part(part.sites, part.chosen.fit)
-                if new:
-                    held = Held.of(self._together(held))
-                changed += [part.sites for part in new]
-            kept = self.pruned(self.store.fitted(held.effects, whole))
-            whole, considered = kept.fit, considered + kept.considered
-            if not changed:
-                break
-            waiting = tuple(part for part in self._order(whole) if [part] != changed)
-        return Chosen(whole, considered)
+        whole = self.grown(begin)
+        for _ in range(self.store.fitter.exchanges):
+            other = self._changed(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
+            if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= 0.0:
+                return Chosen(whole.fit, whole.considered + other.considered)
+            whole = self.grown(other.fit).after(whole.considered + other.considered)
+        return whole
 
-    def _searched(self, held: Held, parts: Sequence[frozenset[str]], *, again: bool) -> list[SearchedPart]:
-        """What the searches of some parts choose, each beside what is held of the others.
+    def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
+        """The fit with further effects: one of each part at a time, since numbers of other parts follow it."""
+        whole = Chosen(begin or self.begun())
+        seen = set[frozenset[str]]()
+        while len(seen) != steps and frozenset(whole.fit.effects) not in seen:
+            seen.add(frozenset(whole.fit.effects))
+            for parts in _side_by_side(self._order(whole.fit)):
+                whole = self._changed(whole.fit, parts, self._grown_in).after(whole.considered)
+        return whole
 
-        Args:
-            held: What the robot has.
-            parts: That are searched side by side.
-            again: Whether they were searched before others changed; only those that may gain something now are, then.
-        """
+    def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
+        """A part with one effect more, where any may gain enough."""
+        return self._search_in(store, own).grown(own, steps=1) if store.is_promising(own) else Chosen(own)
 
-        def searched(sites: frozenset[str]) -> SearchedPart:
-            store, begun = self._beside(held, sites)
-            if again and not store.is_promising(begun):
-                return SearchedPart(sites, begun, Chosen(begun))
-            return SearchedPart(sites, begun, self._search_in(store, begun).run(begun))
+    def _exchanged_in(self, store: FitStore, own: Fit) -> Chosen:
+        """A part with better effects in the place of its own."""
+        return self._search_in(store, own).exchanged(own)
 
-        return self.store.fitter.simulator.side_by_side(searched, parts)
+    def _changed(
+        self, whole: Fit, parts: Sequence[frozenset[str]], change: Callable[[FitStore, Fit], Chosen]
+    ) -> Chosen:
+        """A fit after a change of some parts, each by itself beside all that the others have."""
+        found = self.store.fitter.simulator.side_by_side(lambda sites: change(*self._part(whole, sites)), parts)
+        considered = tuple(each for chosen in found for each in chosen.considered)
+        held = Held.of(whole)
+        for sites, chosen in zip(parts, found, strict=True):
+            if set(chosen.fit.effects) != set(_effects_at(whole, sites)):
+                held = held.with_part(sites, chosen.fit)
+        if set(held.effects) == set(whole.effects):
+            return Chosen(whole, considered)
+        return self.pruned(self._together(held)).after(considered)
 
     def begun(self) -> Fit:
-        """The fit of the effects that recorded forces ask for; the nominal model's where these do not gain enough."""
+        """The fit of the effects that recorded forces ask for, as far as they are worth it."""
         expected = self.store.setting.asked_for
         effects = tuple(dict.fromkeys(name.rpartition(".")[0] for name in expected))
         if not effects:
             return self.nominal
         fit = self._first_fit(effects, expected)
-        return fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
+        return self.pruned(fit).fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
 
     def fit_from(self, other: Fit) -> Fit:
         """The fit of what another kind of evidence has found, as far as this one looks for it."""
@@ -198,7 +185,7 @@ class RobotSearch(Search):
     def _first_fit(self, effects: tuple[str, ...], values: Mapping[str, float]) -> Fit:
         """The fit of effects that were found without this search."""
         hypothesis = Hypothesis.of(self.store.setting, effects, {**self.nominal.hypothesis.values, **values})
-        return self.store.restarted(self.store.keep(self.store.fitter.first_fit(hypothesis, self.nominal.levels)))
+        return self.store.keep(self.store.fitter.first_fit(hypothesis, self.nominal.levels))
 
     def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
         """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
@@ -214,8 +201,9 @@ class RobotSearch(Search):
 
     def pruned(self, fit: Fit) -> Chosen:
         """Without the effects that those of other parts make superfluous, looked for among the weakest ones."""
-        weakest = sorted(fit.effects, key=lambda effect: expected_loss(fit, effect)) if len(fit.effects) > 1 else ()
-        for effect in weakest[:TRIED]:
+        losses = {effect: expected_loss(fit, effect) for effect in fit.effects} if len(fit.effects) > 1 else {}
+        doubted = [each for each in losses if losses[each] < DOUBTED * self.criteria.most_required(fit, each)]
+        for effect in sorted(doubted, key=lambda effect: losses[effect])[:TRIED]:
             smaller = self.store.without(fit, effect)
             if not self.criteria.gains_enough(smaller, fit):
                 considered = ConsideredEffect(effect, evidence(smaller, fit), False, "superfluous beside other joints'")
@@ -224,15 +212,19 @@ class RobotSearch(Search):
 
     def split(self, fit: Fit) -> tuple[tuple[Search, Fit], ...]:
         """The searches of the parts that have effects, and the fit as each of them sees it."""
-        parts = [sites for sites in parts_of(self.plant) if any(_site(effect) in sites for effect in fit.effects)]
-        return tuple(self.store.fitter.simulator.side_by_side(lambda sites: self._part(fit, sites), parts))
+        parts = self.store.fitter.simulator.side_by_side(
+            lambda sites: self._part(fit, sites), self._parts_with_effects(fit)
+        )
+        return tuple((self._search_in(store, own), own) for store, own in parts)
+
+    def _parts_with_effects(self, fit: Fit) -> list[frozenset[str]]:
+        return [sites for sites in parts_of(self.plant) if _effects_at(fit, sites)]
 
     def joined(self, fit: Fit, parts: tuple[Fit, ...]) -> Fit:
         """The fit of a robot, with the effects that its parts have now."""
         held = Held.of(fit)
-        for part, (search, _) in zip(parts, self.split(fit), strict=True):
-            assert search.store.setting.sites is not None
-            held = held.with_part(search.store.setting.sites, part)
+        for sites, part in zip(self._parts_with_effects(fit), parts, strict=True):
+            held = held.with_part(sites, part)
         return self._together(held)
 
     def _together(self, held: Held) -> Fit:
@@ -240,16 +232,14 @@ class RobotSearch(Search):
         hypothesis = Hypothesis.of(self.store.setting, held.effects, held.values)
         return self.store.keep(self.store.fitter.converged(self.store.fitter.fit(hypothesis, held.levels)))
 
-    def _part(self, fit: Fit, sites: frozenset[str]) -> tuple[Search, Fit]:
-        """The search of a part beside a fit, and the fit as it sees it."""
+    def _part(self, fit: Fit, sites: frozenset[str]) -> tuple[FitStore, Fit]:
+        """Fits of a part beside what a fit has elsewhere, and the one where its search begins."""
         key = (id(fit), sites)
         if key not in self._known:
-            store, own = self._beside(Held.of(fit), sites)
-            self._known[key] = (fit, self._search_in(store, own), own)
+            self._known[key] = (fit, *self._beside(Held.of(fit), sites))
         return self._known[key][1:]
 
     def _beside(self, held: Held, sites: frozenset[str]) -> tuple[FitStore, Fit]:
-        """Fits of a part beside what the robot has elsewhere, and the one where its search begins."""
         whole = self.store.setting
         own = tuple(effect for effect in held.effects if _site(effect) in sites)
         given: dict[str, dict[str, float]] = {name: dict(values) for name, values in held.extra.items()}

@@ -86,10 +86,22 @@ class Search:
         Args:
             begin: A fit whose effects are the first ones; None for none.
         """
+        grown = self.grown(begin)
+        return self.exchanged(grown.fit).after(grown.considered)
+
+    def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
+        """The fit with further effects, each of which was the best beside those before.
+
+        Args:
+            begin: A fit whose effects are the first ones; None for none.
+            steps: At most; None for as many as are worth it.
+        """
         current, best = (begin, None) if begin is not None and begin.effects else (self.nominal, self.first)
         considered: History = ()
         seen, fleeting = set[frozenset[str]](), set[frozenset[str]]()
         while len(current.effects) < self.rules.most_effects and frozenset(current.effects) not in seen:
+            if len(seen) == steps:
+                break
             seen.add(frozenset(current.effects))  # elimination may lead back to where the search has been
             extended = self.store.extensions(current)
             if current.effects:
@@ -118,7 +130,7 @@ class Search:
                 break
             considered += _step(current, extended, best, fleeting) + pruned.considered
             current = pruned.fit
-        return self.exchanged(current).after(considered)
+        return Chosen(current, considered)
 
     def split(self, fit: Fit) -> "tuple[tuple[Search, Fit], ...]":
         """The searches by which a robot is searched part by part, and the fit as each sees it: itself."""
