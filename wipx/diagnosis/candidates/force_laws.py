@@ -4,13 +4,15 @@ All of it is a sum of columns: forces per unit of the inertial numbers of the li
 5(3)), of gravity's direction, and of what a joint lacks by itself. An effect says how much it takes of each column.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.core.tree import Link, Tree
+from wipx.effects.catalogue import effect_of
 from wipx.identify.inverse_dynamics import Signals, gravity_regressor, numbers, regressor, weight_of
 from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import gravity, inertial_numbers
@@ -32,7 +34,7 @@ class ForceLaw:
         starts: Where a fit may start, shape (S, n), from the sizes that fit best without the effect's law.
         numbers: Its numbers by symbol [SI], from what is fitted.
         low: Lower bounds of what is fitted, shape (n,).
-        usual: Its standard deviations beforehand, shape (n,); infinite where any is as likely.
+        usual: Its standard deviations about zero beforehand, shape (n,); infinite where any is as likely.
         measured: Symbol of the number that is fitted first; empty for none.
         contains: Effect that it has as a special case; empty for none.
     """
@@ -112,6 +114,7 @@ def force_laws(model: Model) -> dict[str, ForceLaw]:
     """
     tree = _tree_of(model)
     longest = max(float(np.linalg.norm(link.place)) for link in tree.links) or 1.0
+    heaviest = max(link.mass for link in tree.links)
     laws: dict[str, ForceLaw] = {}
     first = NUMBERS * len(tree.links)
     laws["environment/base_tilt"] = ForceLaw(
@@ -126,7 +129,7 @@ def force_laws(model: Model) -> dict[str, ForceLaw]:
     for i, link in enumerate(tree.links):
         laws |= _joint_laws(link.joint, first + 2 + OWN * i)
         if link.mass:
-            laws |= _link_laws(model, link, np.arange(NUMBERS * i, NUMBERS * (i + 1)), longest)
+            laws |= _link_laws(model, link, NUMBERS * i, longest, heaviest)
     return laws
 
 
@@ -179,54 +182,82 @@ def _single(sizes: np.ndarray) -> np.ndarray:
     return sizes[None]
 
 
-def _link_laws(model: Model, link: Link, columns: np.ndarray, longest: float) -> dict[str, ForceLaw]:
-    """The laws of a link."""
-    mass = model.parameters[f"{link.body}.mass"]
+@dataclass(frozen=True)
+class _LinkEffect:
+    """What an effect adds to a link's inertial numbers. Fitted are changes of its numbers from the neutral ones."""
 
-    def moved(moment: np.ndarray, heavy: float) -> np.ndarray:
-        """Place in the body's frame of a mass with a first moment in the link's frame, each shape (3,)."""
-        return link.body_rotation.T @ (moment / heavy - link.body_place)
+    model: Model
+    link: Link
+    kind: str
+
+    @property
+    def name(self) -> str:
+        return f"link_{self.link.body}/{self.kind}"
+
+    @cached_property
+    def neutral(self) -> dict[str, float]:
+        return effect_of(self.name, self.model.plant).neutral
+
+    def numbers(self, fitted: np.ndarray) -> dict[str, float]:
+        return dict(zip(self.neutral, (self._about + fitted).tolist(), strict=True))
+
+    def sizes(self, fitted: np.ndarray) -> np.ndarray:
+        return self._sizes_of_many(fitted[None])[:, 0]
+
+    def slopes(self, fitted: np.ndarray) -> np.ndarray:
+        step = SHIFT * np.eye(len(fitted))
+        return (self._sizes_of_many(fitted + step) - self._sizes_of_many(fitted - step)) / (2.0 * SHIFT)
+
+    def _sizes_of_many(self, fitted: np.ndarray) -> np.ndarray:
+        """For what is fitted (P, n), shape (10, P)."""
+        batch = ModelBatch(self._model, self._names, self._about + fitted)
+        return inertial_numbers(batch, self.link) - self._without
+
+    @cached_property
+    def _about(self) -> np.ndarray:
+        return np.array(list(self.neutral.values()))
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(f"{self.name}.{symbol}" for symbol in self.neutral)
+
+    @cached_property
+    def _model(self) -> Model:
+        return self.model.with_effects({self.name: self.neutral})
+
+    @cached_property
+    def _without(self) -> np.ndarray:
+        return inertial_numbers(ModelBatch(self.model), self.link)
+
+
+def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: float) -> dict[str, ForceLaw]:
+    """The laws of a link, whose columns begin at `first`, of a robot whose links are so long [m] and heavy [kg]."""
+    mass, place = model.parameters[f"{link.body}.mass"], np.full(3, longest)
 
     def off_centre(sizes: np.ndarray) -> np.ndarray:
         return (link.body_rotation.T @ sizes[1:4] / mass)[None]
 
+    def unchanged(sizes: np.ndarray) -> np.ndarray:
+        return np.zeros((1, 1))
+
     def masses(sizes: np.ndarray) -> np.ndarray:
+        """Several masses with the same first moment."""
         moment = sizes[1:4]
         tried = [float(np.linalg.norm(moment)) / (share * longest) for share in ARMS]
-        heavy = [each for each in (*tried, float(sizes[0])) if each > 0.0]
-        return np.array([[each, *moved(moment, each)] for each in heavy]).reshape(-1, 4)
+        heavy = np.array([each for each in (*tried, float(sizes[0])) if each > 0.0])[:, None]
+        return np.column_stack([heavy, (moment / np.maximum(heavy, 1e-300) - link.body_place) @ link.body_rotation])
 
-    def law(kind: str, names: Sequence[str], starts: Callable, low: np.ndarray, usual: np.ndarray) -> ForceLaw:
-        effect = f"link_{link.body}/{kind}"
-
-        def named(fitted: np.ndarray) -> dict[str, float]:
-            return dict(zip(names, fitted.tolist(), strict=True))
-
-        def sizes(fitted: np.ndarray) -> np.ndarray:
-            return of_many(fitted[None])[:, 0]
-
-        def slopes(fitted: np.ndarray) -> np.ndarray:
-            step = SHIFT * np.eye(len(fitted))
-            return (of_many(fitted + step) - of_many(fitted - step)) / (2.0 * SHIFT)
-
-        def of_many(fitted: np.ndarray) -> np.ndarray:
-            """Sizes (10, P) for what is fitted (P, n)."""
-            batch = ModelBatch(loaded, tuple(f"{effect}.{name}" for name in names), fitted)
-            return inertial_numbers(batch, link) - plain
-
-        loaded = model.with_effects({effect: named(np.zeros(len(low)))})
-        return ForceLaw(columns, sizes, slopes, starts, named, low, usual)
-
-    plain, place = inertial_numbers(ModelBatch(model), link), np.full(3, longest)
-    return {
-        f"link_{link.body}/com_offset": law("com_offset", "xyz", off_centre, np.full(3, -np.inf), MISPLACED * place),
-        f"link_{link.body}/inertia": law(
-            "inertia", ("scale",), lambda sizes: np.ones((1, 1)), np.array([0.1]), np.array([np.inf])
-        ),
-        f"link_{link.body}/payload": law(
-            "payload", ("mass", *"xyz"), masses, np.array([0.0, *np.full(3, -np.inf)]), np.array([np.inf, *place])
-        ),
+    starts = {
+        "com_offset": (off_centre, np.full(3, -np.inf), MISPLACED * place),
+        "inertia": (unchanged, np.array([-0.9]), np.ones(1)),
+        "payload": (masses, np.array([0.0, *np.full(3, -np.inf)]), np.array([heaviest, *place])),
     }
+    columns = np.arange(first, first + NUMBERS)
+    laws = {}
+    for kind, (begins, low, usual) in starts.items():
+        own = _LinkEffect(model, link, kind)
+        laws[own.name] = ForceLaw(columns, own.sizes, own.slopes, begins, own.numbers, low, usual)
+    return laws
 
 
 def _tilts(model: Model, tree: Tree) -> np.ndarray:

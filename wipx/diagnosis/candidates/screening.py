@@ -36,7 +36,7 @@ SCANS: dict[str, Scan] = {
     "gaps": plays,
     "point_masses": point_masses,
 }  # first guesses that take more than a grid, by `Effect.scan`
-LOUD = (saturations, speed_limits, plays)  # of effects without which an observer asks a joint for much force
+LOUD = (saturations, speed_limits, plays)  # of effects whose lack a joint shows plainly
 
 
 @dataclass(frozen=True)
@@ -171,11 +171,12 @@ def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.
 
 
 def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
-    """Whether the observer asks the joint of an effect for no force to speak of, beside those of the fit's laws."""
+    """Whether the laws of a fit leave the joint of an effect nothing to speak of, neither a force nor coloured errors."""
     plant = setting.nominal.plant
-    joint = plant.joint_at(name.partition("/")[0])
+    j = plant.joints.index(plant.joint_at(name.partition("/")[0]))
     by_row, seen = fitter.sketched_by_row(fit)
-    return not by_row.asks_for_force(seen.levels, setting.scales)[plant.joints.index(joint)]
+    white = by_row.foretold(seen)[j] <= fitter.rules.trust.foretold
+    return bool(white) and not by_row.asks_for_force(seen.levels, setting.scales)[j]
 
 
 def _scanned(scan: Scan, fitter: Fitter, fit: Fit, name: str) -> np.ndarray:

@@ -60,6 +60,8 @@ class Regression:
         self.laws, self._lacking, self._columns = laws, lacking, columns
         both = (np.column_stack([lacking[:, j], columns.of_joint(j)]) for j in range(lacking.shape[1]))
         self._grams = np.stack([each.T @ each / len(each) for each in both])
+        felt = np.diagonal(self._grams, axis1=1, axis2=2)[:, 1:] > 0.0  # by which joints, (joints, C)
+        self._felt = {effect: felt[:, law.columns].any(axis=1) for effect, law in laws.items()}
         self._noise_of(np.zeros(columns.count))
 
     def beside(self, fit: Fitted) -> Fitted:
@@ -147,7 +149,8 @@ class Regression:
         return -0.5 * float(self._rows @ np.log(np.maximum(self._powers(sizes), 1e-300)))
 
     def _penalty(self, effects: Iterable[str]) -> float:
-        return 0.5 * sum(self.laws[effect].count for effect in effects) * float(np.log(self._rows.sum()))
+        rows = {effect: float(self._rows[self._felt[effect]].sum()) for effect in effects}  # that can tell of it
+        return 0.5 * sum(self.laws[effect].count * float(np.log(rows[effect])) for effect in effects)
 
     def _sizes(self, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
         sizes = np.zeros(self._columns.count)

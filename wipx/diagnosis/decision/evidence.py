@@ -63,19 +63,19 @@ def found(context: Context, search: Search, watcher: Watcher) -> Found:
 def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
     """What is missing of a robot of many joints.
 
-    Its joints do not all lack the same: exact laws hold on some joint from the beginning. If they hold on none,
+    Its joints do not all lack the same: exact laws hold on some joint beside the first effects. If they hold on none,
     forecasts come first, and innovations are searched only if laws hold on some joint beside what forecasts find.
     """
     if context.by_forecasts_alone:
         chosen = Chosen(search.nominal)
         ahead = _by_forecasts_and_forces(context, chosen.fit, watcher)
         return ahead or _by_innovations(context, search, chosen, watcher)
-    begun = search.begun()
-    if not context.holds_somewhere(begun):
-        ahead = _by_forecasts_and_forces(context, begun, watcher)
+    begun = search.grown(steps=1)
+    if not context.holds_somewhere(begun.fit):
+        ahead = _by_forecasts_and_forces(context, begun.fit, watcher)
         if ahead is not None and not context.holds_somewhere(search.fit_from(ahead.rest.fit)):
             return ahead
-    chosen = search.run(begun)
+    chosen = search.run(begun.fit).after(begun.considered)
     holds = context.is_quiet(chosen.fit) and context.holds_somewhere(chosen.fit)
     ahead = None if holds else _by_forecasts_and_forces(context, chosen.fit, watcher)
     return ahead or _by_innovations(context, search, chosen, watcher)

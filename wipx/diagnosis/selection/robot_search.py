@@ -139,11 +139,13 @@ class RobotSearch(Search):
         """The fit with further effects: one of each part at a time, since numbers of other parts follow it."""
         whole = Chosen(begin or self.begun())
         seen = set[frozenset[str]]()
-        while len(seen) != steps and frozenset(whole.fit.effects) not in seen:
+        while frozenset(whole.fit.effects) not in seen:
+            if len(seen) == steps:
+                return whole
             seen.add(frozenset(whole.fit.effects))
             for parts in _side_by_side(self._order(whole.fit)):
                 whole = self._changed(whole.fit, parts, self._grown_in).after(whole.considered)
-        return whole
+        return self.pruned(whole.fit).after(whole.considered)
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with one effect more, where any may gain enough."""
@@ -165,7 +167,7 @@ class RobotSearch(Search):
                 held = held.with_part(sites, chosen.fit)
         if set(held.effects) == set(whole.effects):
             return Chosen(whole, considered)
-        return self.pruned(self._together(held)).after(considered)
+        return Chosen(self._together(held), considered)
 
     def begun(self) -> Fit:
         """The fit of the effects that recorded forces ask for, as far as they are worth it."""
@@ -174,7 +176,7 @@ class RobotSearch(Search):
         if not effects:
             return self.nominal
         fit = self._first_fit(effects, expected)
-        return self.pruned(fit).fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
+        return fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
 
     def fit_from(self, other: Fit) -> Fit:
         """The fit of what another kind of evidence has found, as far as this one looks for it."""
