@@ -99,6 +99,22 @@ def test_states_of_an_arm_with_a_stiff_position_drive_err_as_the_filter_says(tmp
     assert np.all(error_over_claim(model, recording, true, NOISE) < 1.6)
 
 
+def test_states_behind_a_late_sensor_err_as_the_filter_says(fresh_seed: int):
+    """Within the delay the joint turns round: its position now is not what it showed plus the delay times its rate."""
+    late, rng = 0.02, np.random.default_rng(fresh_seed)
+    model = nominal_model("linear_axis").with_effects({"sensor_x/delay": {"tau": late}})
+    t = np.arange(0.0, 6.0, 0.004)
+    force = 30.0 * np.sin(20.0 * t + rng.uniform(0.0, 6.0))
+    run = SIMULATOR.replay(ModelBatch(model), Inputs.of([t], [force[:, None]], [0]), np.zeros((2, 1, 1)))
+    exact = SIMULATOR.replay(
+        ModelBatch(nominal_model("linear_axis")), Inputs.of([t], [force[:, None]], [0]), np.zeros((2, 1, 1))
+    )
+    noise = np.array([2e-5])
+    x = run.coordinates[:, 0, 0, 0] + noise * rng.normal(size=len(t))
+    true = np.stack([exact.coordinates[:, 0, 0, 0], exact.rates[:, 0, 0, 0]], axis=1)
+    assert np.all(error_over_claim(model, Recording("late.csv", {"t": t, "x": x, "u": force}), true, noise) < 1.6)
+
+
 def test_states_from_a_log_of_mean_commands_err_as_the_filter_says(fresh_seed: int):
     """Each row has the mean of four noisy commands: how they shook the robot within the row is not in the log."""
     model, rng = nominal_model("linear_axis"), np.random.default_rng(fresh_seed)

@@ -12,6 +12,7 @@ of a random walk and sensor noise of spectral density r [rad sqrt(s)] give a fil
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -80,7 +81,9 @@ class Smoother:
         coordinates, rates = (np.nan_to_num(x.transpose(0, 3, 1, 2)) for x in (shown.coordinates, shown.rates))
         coordinates /= scale
         surprises = self._measured.transpose(0, 2, 1)[..., None] / scale - coordinates
-        prior = np.concatenate([coordinates + late * rates, rates], axis=2)  # (K + 1, R, 2 joints, P)
+        prior = np.concatenate(
+            [coordinates + self._moved_within(late, rates), rates], axis=2
+        )  # (K + 1, R, 2 joints, P)
         if len(filters) == 1:
             found = filters[0].smoothed(prior, surprises)
         else:
@@ -88,6 +91,27 @@ class Smoother:
             parts = [f.smoothed(*(x[..., [p]] for x in own)) for p, f in enumerate(filters)]
             found = np.concatenate(parts, axis=2)
         return (found * np.tile(scale, (2, 1))).transpose(2, 0, 1)
+
+    def _moved_within(self, late: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        """How far each joint has moved up to every row since a time before it, shape (K + 1, R, joints, P).
+
+        Args:
+            late: That time, shape (joints, P) [s].
+            rates: At the rows, linear between them, shape (K + 1, R, joints, P).
+        """
+        found = np.zeros_like(rates)
+        for r, j in product(range(rates.shape[1]), np.flatnonzero(late.any(axis=1))):
+            t, rate = self._inputs.t[:, r], rates[:, r, j]
+            steps = np.maximum(np.diff(t), 1e-12)[:, None]
+            way = np.concatenate(
+                [np.zeros((1, rate.shape[1])), np.cumsum(0.5 * steps * (rate[1:] + rate[:-1]), axis=0)]
+            )
+            before = t[:, None] - late[j]
+            k = np.clip(np.searchsorted(t, before, side="right") - 1, 0, len(t) - 2)
+            past, change = before - t[k], np.take_along_axis(np.diff(rate, axis=0) / steps, k, 0)
+            then = np.take_along_axis(way, k, 0) + past * np.take_along_axis(rate, k, 0)
+            found[:, r, j] = way - (then + 0.5 * past * np.maximum(past, 0.0) * change)
+        return found
 
     def disturbance(self, model: Model, bandwidth: np.ndarray) -> np.ndarray:
         """Acceleration that a model lacks at every row, by the rows up to it, shape (K + 1, joints, R).
@@ -179,12 +203,12 @@ class Smoother:
 
     def _first_states(self, batch: ModelBatch) -> np.ndarray:
         """True states at the first rows, by parabolas through what the sensors show, shape (2 joints, P, R)."""
-        joints = len(self.plant.coordinates)
-        shown = np.zeros((2 * joints, len(self.recordings)))
+        joints, late = len(self.plant.coordinates), delays_of(batch)
+        shown = np.zeros((2 * joints, batch.size, len(self.recordings)))
         for r, recording in enumerate(self.recordings):
             t = recording.t - recording.t[0]
             count = min(max(FEWEST_ROWS, int(np.searchsorted(t, FIRST_SPAN))), len(t))
             for j, name in enumerate(self.plant.coordinates):
-                fit = np.polynomial.polynomial.polyfit(t[:count], recording[name][:count], min(2, count - 1))
-                shown[j, r], shown[joints + j, r] = fit[0], fit[1]
-        return true_states(batch, np.repeat(shown[:, None], batch.size, axis=1))
+                course = np.polynomial.Polynomial.fit(t[:count], recording[name][:count], min(2, count - 1))
+                shown[j, :, r], shown[joints + j, :, r] = course(late[j]), course.deriv()(late[j])
+        return true_states(batch, shown)

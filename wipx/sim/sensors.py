@@ -7,13 +7,13 @@ from wipx.sim.rows import W
 
 @law
 def interpolate(past, t_rows, window, k, j, lane, moment):
-    """Coordinate j at a `moment` up to row k: cubic Hermite between rows; held before the first."""
+    """Coordinate j at a `moment` up to row k: cubic Hermite between rows; at a steady rate before the first."""
     joints = past.shape[1] // 2
+    if moment <= t_rows[0, window]:
+        return past[0, j, lane] + (moment - t_rows[0, window]) * past[0, joints + j, lane]
     i = k - 1
     while i > 0 and t_rows[i, window] > moment:
         i -= 1
-    if i < 0:
-        return past[0, j, lane]
     h = t_rows[i + 1, window] - t_rows[i, window]
     if h <= 0.0:
         return past[i + 1, j, lane]

@@ -171,7 +171,7 @@ def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.
 
 
 def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
-    """Whether the laws of a fit leave the joint of an effect nothing to speak of, neither a force nor coloured errors."""
+    """Whether the laws of a fit leave the joint of an effect neither a force to speak of nor coloured errors."""
     plant = setting.nominal.plant
     j = plant.joints.index(plant.joint_at(name.partition("/")[0]))
     by_row, seen = fitter.sketched_by_row(fit)
