@@ -48,7 +48,8 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) 
         normal, score = slopes.T @ slopes, slopes.T @ left
         for i in range(part.size):
             pair = [i, i + part.size]
-            force = -np.linalg.solve(normal[np.ix_(pair, pair)] + REGULARISATION * np.eye(2), score[pair])
+            own = normal[np.ix_(pair, pair)]  # alike where the joint hardly moves
+            force = -np.linalg.solve(own + REGULARISATION * (1.0 + np.trace(own)) * np.eye(2), score[pair])
             found.append((-0.5 * float(score[pair] @ force), np.hypot(*force), np.arctan2(-force[1], force[0])))
     gains, amplitudes, phases = np.array(found).T
     chosen = peaks(gains, PEAKS, lambda i: np.abs(np.arange(len(gains)) - i) < APART)
