@@ -6,6 +6,7 @@ parameters into the coefficients of these equations.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 from wipx.core.drive import Drive
@@ -122,11 +123,16 @@ class Plant:
         """
         if site in self.columns:
             return site
+        return self._felt_at.get(site, self.actuated[0] if self.actuated else self.joints[0])
+
+    @cached_property
+    def _felt_at(self) -> dict[str, str]:
+        """Joints of sensors, drives and links."""
         found = {f"sensor_{column}": joint for joint, column in self.columns.items()}
         found |= {f"actuator_{joint}": joint for joint in self.actuated}
         if self.tree is not None:
             found |= {f"link_{link.body}": link.joint for link in self.tree.links}
-        return found.get(site, self.actuated[0] if self.actuated else self.joints[0])
+        return found
 
     def joints_at(self, site: str) -> tuple[str, ...]:
         """The joints at which an effect at `site` acts: all that are driven for a common actuator."""
