@@ -7,7 +7,8 @@ import numpy as np
 
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.identify.evaluation import RIGHT, Judge
+from wipx.identify.evaluation import Judge
+from wipx.identify.smoothing import BANDWIDTHS
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.simulator import Simulator
 
@@ -21,6 +22,7 @@ def resolving(simulator: Engine, model: Model, recordings: tuple[Recording, ...]
     """A simulator with steps so short that halving them changes short predictions less than the sensors' noise does.
 
     A robot from a model file may have drives whose own loops are faster than the usual step. Other plants have none.
+    Predictions start from states that hardly trust the model, so that they move as the robot does, however wrong it is.
 
     Args:
         simulator: With the usual step.
@@ -31,7 +33,7 @@ def resolving(simulator: Engine, model: Model, recordings: tuple[Recording, ...]
     if model.plant.tree is None or not isinstance(simulator, AnalyticSimulator):
         return simulator
     shortest = FINEST * simulator.step
-    judge = Judge(simulator, noise, AHEAD, dict.fromkeys(model.plant.coordinates, RIGHT))
+    judge = Judge(simulator, noise, AHEAD, dict.fromkeys(model.plant.coordinates, BANDWIDTHS[-1]))
     same = judge.from_same_states(model, recordings)
     predicted = np.broadcast_to(same.starts.windows.predicted[:, None], same.starts.windows.recorded.shape)
     shown = same.predicted(model, simulator)

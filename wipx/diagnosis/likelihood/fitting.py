@@ -106,12 +106,14 @@ class Fitter(ABC):
         considered: Effects that are fitted in each step of a search, at most.
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
-        exchanges: Times that parts of a robot of many joints exchange their effects for better ones, at most.
+        at_a_time: Effects that a part of a robot of many joints gets before all numbers are fitted again; None for all.
+        exchanges: Times that parts of such a robot exchange their effects for better ones, at most.
     """
 
     considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
+    at_a_time: ClassVar[int | None]
     exchanges: ClassVar[int]
 
     @property

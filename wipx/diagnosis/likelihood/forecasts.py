@@ -84,6 +84,7 @@ class ForecastFitter(Fitter):
     considered = 12
     steps = 3
     close_call = 20.0
+    at_a_time = None
     exchanges = 1  # where no law holds, a second one finds what stands in for others
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 

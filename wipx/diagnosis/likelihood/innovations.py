@@ -43,6 +43,7 @@ class InnovationFitter(Fitter):
     considered = 6
     steps = 5
     close_call = 60.0
+    at_a_time = 1
     exchanges = 2
 
     innovations_model: InnovationsModel

@@ -136,7 +136,7 @@ class RobotSearch(Search):
         return whole
 
     def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
-        """The fit with further effects: one of each part at a time, since numbers of other parts follow it."""
+        """The fit with further effects, of one part beside those of the others; numbers of other parts follow them."""
         whole = Chosen(begin or self.begun())
         seen = set[frozenset[str]]()
         while frozenset(whole.fit.effects) not in seen:
@@ -148,8 +148,10 @@ class RobotSearch(Search):
         return self.pruned(whole.fit).after(whole.considered)
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
-        """A part with one effect more, where any may gain enough."""
-        return self._search_in(store, own).grown(own, steps=1) if store.is_promising(own) else Chosen(own)
+        """A part with further effects, where any may gain enough."""
+        if not store.is_promising(own):
+            return Chosen(own)
+        return self._search_in(store, own).grown(own, steps=store.fitter.at_a_time)
 
     def _exchanged_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with better effects in the place of its own."""
