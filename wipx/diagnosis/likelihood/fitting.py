@@ -107,13 +107,15 @@ class Fitter(ABC):
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
         at_a_time: Effects that a part of a robot of many joints gets before all numbers are fitted again; None for all.
-        exchanges: Times that parts of such a robot exchange their effects for better ones, at most.
+        rounds: Times that each of these parts gets further effects; None for as often as any gains enough.
+        exchanges: Times that they exchange their effects for better ones, at most.
     """
 
     considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
     at_a_time: ClassVar[int | None]
+    rounds: ClassVar[int | None]
     exchanges: ClassVar[int]
 
     @property

@@ -85,7 +85,8 @@ class ForecastFitter(Fitter):
     steps = 3
     close_call = 20.0
     at_a_time = None
-    exchanges = 1  # where no law holds, a second one finds what stands in for others
+    rounds = 1  # where no law holds, a second one finds what stands in for others
+    exchanges = 1
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
     by_row: InnovationFitter

@@ -44,6 +44,7 @@ class InnovationFitter(Fitter):
     steps = 5
     close_call = 60.0
     at_a_time = 1
+    rounds = None
     exchanges = 2
 
     innovations_model: InnovationsModel

@@ -127,25 +127,25 @@ class RobotSearch(Search):
 
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
-        whole = self.grown(begin)
-        for _ in range(self.store.fitter.exchanges):
+        fitter, grown = self.store.fitter, self.grown(begin, self.store.fitter.rounds)
+        whole = self.pruned(grown.fit).after(grown.considered)
+        for _ in range(fitter.exchanges):
             other = self._changed(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
             if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= 0.0:
                 return Chosen(whole.fit, whole.considered + other.considered)
-            whole = self.grown(other.fit).after(whole.considered + other.considered)
+            grown = self.grown(other.fit, fitter.rounds)
+            whole = self.pruned(grown.fit).after(whole.considered + other.considered + grown.considered)
         return whole
 
     def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
-        """The fit with further effects, of one part beside those of the others; numbers of other parts follow them."""
+        """The fit with further effects of all parts, one part after the other, as often as `steps` or as they gain any."""
         whole = Chosen(begin or self.begun())
         seen = set[frozenset[str]]()
-        while frozenset(whole.fit.effects) not in seen:
-            if len(seen) == steps:
-                return whole
+        while len(seen) != steps and frozenset(whole.fit.effects) not in seen:
             seen.add(frozenset(whole.fit.effects))
             for parts in _side_by_side(self._order(whole.fit)):
                 whole = self._changed(whole.fit, parts, self._grown_in).after(whole.considered)
-        return self.pruned(whole.fit).after(whole.considered)
+        return whole
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with further effects, where any may gain enough."""
