@@ -138,7 +138,7 @@ class RobotSearch(Search):
         return whole
 
     def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
-        """The fit with further effects of all parts, one part after the other, as often as `steps` or as they gain any."""
+        """The fit with further effects of all parts in turn, as often as `steps` says or as any gains enough."""
         whole = Chosen(begin or self.begun())
         seen = set[frozenset[str]]()
         while len(seen) != steps and frozenset(whole.fit.effects) not in seen:
