@@ -5,7 +5,7 @@ All of it is a sum of columns: forces per unit of the inertial numbers of the li
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -13,12 +13,13 @@ import numpy as np
 from wipx.core.model import Model, ModelBatch
 from wipx.core.tree import Link, Tree
 from wipx.effects.catalogue import effect_of
-from wipx.identify.inverse_dynamics import Signals, gravity_regressor, numbers, regressor, weight_of
+from wipx.identify.inverse_dynamics import Signals, gravity_regressor, missing, numbers, regressor, weight_of
 from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
-OWN = 5  # columns of a joint: direction of motion, rate, acceleration, coordinate, minus one
+OWN = 6  # columns of a joint: direction of motion, rate, acceleration, coordinate, minus one, needed force
 SHIFT = 1e-4  # [kg, m, rad], over which slopes are taken
+GAIN = 0.2  # usual error of a drive's gain
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
 ARMS = (0.1, 0.2, 0.4, 0.8)  # of the longest link: distances of a mass that are tried
 
@@ -57,14 +58,16 @@ class ForceLaw:
 
 @dataclass(frozen=True, eq=False)
 class ForceColumns:
-    """Forces of the joints per unit of every size.
+    """Forces of the joints per unit of every size, and what they add up to.
 
     Attributes:
+        lacking: That the motion needs and the model does not give, shape (rows, joints).
         inertial: Per inertial number of each link, shape (rows, joints, 10 N).
         tilt: Per roll and pitch of the base, shape (rows, joints, 2).
-        own: Of each joint alone, shape (rows, joints, 5).
+        own: Of each joint alone, shape (rows, joints, 6).
     """
 
+    lacking: np.ndarray
     inertial: np.ndarray
     tilt: np.ndarray
     own: np.ndarray
@@ -74,14 +77,17 @@ class ForceColumns:
         """Those of a recorded motion."""
         tree = _tree_of(model)
         constant = np.ones_like(signals.rates)
-        own = [signals.slides, signals.rates, signals.accelerations, signals.coordinates, -constant]
+        inertial = regressor(tree, signals, weight_of(model))
+        lacking = missing(model, signals, inertial)
+        needed = lacking + signals.forces
+        own = [signals.slides, signals.rates, signals.accelerations, signals.coordinates, -constant, needed]
         tilted = gravity_regressor(tree, signals, numbers(model)) @ _tilts(model, tree)
-        return cls(regressor(tree, signals, weight_of(model)), tilted, np.stack(own, axis=2))
+        return cls(lacking, inertial, tilted, np.stack(own, axis=2))
 
     def extrapolated(self, wider: "ForceColumns") -> "ForceColumns":
         """Without the bias of the filter, from the same columns behind a filter that is wider by the root of two."""
-        pairs = ((self.inertial, wider.inertial), (self.tilt, wider.tilt), (self.own, wider.own))
-        return ForceColumns(*(2.0 * one - other for one, other in pairs))
+        names = [each.name for each in fields(self)]
+        return ForceColumns(*(2.0 * getattr(self, name) - getattr(wider, name) for name in names))
 
     @property
     def count(self) -> int:
@@ -100,18 +106,20 @@ class ForceColumns:
         alone[:, j] = self.own[:, j]
         return np.concatenate([self.inertial[:, j], self.tilt[:, j], alone.reshape(len(alone), -1)], axis=1)
 
-    def forces(self, sizes: np.ndarray) -> np.ndarray:
-        """Forces of all joints, shape (rows, joints), for sizes (count,)."""
+    def left(self, sizes: np.ndarray) -> np.ndarray:
+        """Force that stays at each joint, shape (rows, joints), for sizes (count,)."""
         ends = np.cumsum([self.inertial.shape[2], self.tilt.shape[2]])
         inertial, tilt, own = np.split(sizes, ends)
-        return self.inertial @ inertial + self.tilt @ tilt + np.sum(self.own * own.reshape(self.own.shape[1:]), axis=2)
+        return (
+            self.lacking
+            + self.inertial @ inertial
+            + self.tilt @ tilt
+            + np.sum(self.own * own.reshape(self.own.shape[1:]), axis=2)
+        )
 
 
 def force_laws(model: Model) -> dict[str, ForceLaw]:
-    """The laws of the effects "site/kind" that are sums of columns.
-
-    A wrong gain is not among them: least squares takes dry friction, most of the force of a slow joint, for one.
-    """
+    """The laws of the effects "site/kind" that are sums of columns."""
     tree = _tree_of(model)
     longest = max(float(np.linalg.norm(link.place)) for link in tree.links) or 1.0
     heaviest = max(link.mass for link in tree.links)
@@ -153,6 +161,15 @@ def _joint_laws(site: str, first: int) -> dict[str, ForceLaw]:
         f"{site}/rotor_inertia": _proportional(first + 2, "J"),
         offset: _proportional(first + 4, "F_0", -np.inf),
         f"{site}/spring": spring,
+        f"actuator_{site}/gain": ForceLaw(
+            np.array([first + 5]),
+            _same,
+            _one_to_one,
+            _single,
+            lambda fitted: {"k": 1.0 / (1.0 + float(fitted[0]))},
+            np.array([-0.8]),
+            np.array([GAIN]),
+        ),
     }
 
 

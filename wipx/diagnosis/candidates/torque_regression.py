@@ -18,7 +18,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.candidates.force_laws import ForceColumns, ForceLaw, force_laws
 from wipx.diagnosis.likelihood.hypothesis import ByForces
 from wipx.effects.catalogue import vocabulary
-from wipx.identify.inverse_dynamics import missing, signals_of
+from wipx.identify.inverse_dynamics import signals_of
 from wipx.identify.motion import independent_rows, motions
 from wipx.identify.noise import sensor_noise
 
@@ -55,10 +55,10 @@ class Regression:
     What a fit leaves of the force of a joint, `noise` of that joint, counts for the next ones as its noise.
     """
 
-    def __init__(self, lacking: np.ndarray, columns: ForceColumns, laws: Mapping[str, ForceLaw]) -> None:
-        """Of forces that the motion needs and the model does not give, shape (rows, joints)."""
-        self.laws, self._lacking, self._columns = laws, lacking, columns
-        both = (np.column_stack([lacking[:, j], columns.of_joint(j)]) for j in range(lacking.shape[1]))
+    def __init__(self, columns: ForceColumns, laws: Mapping[str, ForceLaw]) -> None:
+        self.laws, self._columns = laws, columns
+        joints = range(columns.lacking.shape[1])
+        both = (np.column_stack([columns.lacking[:, j], columns.of_joint(j)]) for j in joints)
         self._grams = np.stack([each.T @ each / len(each) for each in both])
         felt = np.diagonal(self._grams, axis1=1, axis2=2)[:, 1:] > 0.0  # by which joints, (joints, C)
         self._felt = {effect: felt[:, law.columns].any(axis=1) for effect, law in laws.items()}
@@ -98,7 +98,8 @@ class Regression:
         """Sizes of the columns of some effects, whatever their laws, and the score of a fit that would reach them."""
         taken = np.unique(np.concatenate([self.laws[effect].columns for effect in effects]))
         own = self._root[:, 1 + taken]
-        scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
+        norm = np.linalg.norm(own, axis=0)
+        scale = np.where(norm > 0.0, norm, np.inf)
         held = np.concatenate([own / scale, np.sqrt(ALIKE) * np.eye(len(taken))])
         sizes = np.zeros(self._columns.count)
         sizes[taken] = np.linalg.lstsq(held, np.concatenate([-self._root[:, 0], np.zeros(len(taken))]))[0] / scale
@@ -134,12 +135,15 @@ class Regression:
         return {n: own for n, own in fit.numbers.items() if n not in apart and self.laws[n].contains != effect}
 
     def _noise_of(self, sizes: np.ndarray) -> None:
-        left = self._lacking + self._columns.forces(sizes)
+        left = self._columns.left(sizes)
         self._rows = np.array([max(independent_rows(each[:, None]), 2.0) for each in left.T])
         powers = self._powers(sizes)
         weights = np.where(powers > 0.0, self._rows / np.maximum(powers, 1e-300), 0.0)
-        values, vectors = np.linalg.eigh(np.tensordot(weights, self._grams, 1))
-        self._root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T  # (C + 1, C + 1)
+        normal = np.tensordot(weights, self._grams, 1)
+        scale = np.sqrt(np.diag(normal))
+        shown = np.where(scale > 0.0, scale, np.inf)
+        values, vectors = np.linalg.eigh(normal / np.outer(shown, shown))
+        self._root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale  # (C + 1, C + 1)
 
     def _judged(self, numbers: Mapping[str, np.ndarray], sizes: np.ndarray) -> Fitted:
         surprise = sum(0.5 * float(np.sum((own / self.laws[name].usual) ** 2)) for name, own in numbers.items())
@@ -175,11 +179,11 @@ def numbers_by_forces(model: Model, recordings: Sequence[Recording]) -> dict[str
         model: A robot from a model file, as its owner believes it to be.
         recordings: Of it.
     """
-    lacking, columns = _forces(model, tuple(recordings))
+    columns = _forces(model, tuple(recordings))
     known = vocabulary(model.plant).keys() - model.effects.keys()
     shown = np.flatnonzero(columns.sizes)
     laws = {n: law for n, law in force_laws(model).items() if n in known and np.isin(law.columns, shown).any()}
-    regression = Regression(lacking, columns, laws)
+    regression = Regression(columns, laws)
     chosen = _selected(regression)
     found: dict[str, ByForces] = {}
     for name, law in laws.items():
@@ -193,8 +197,8 @@ def numbers_by_forces(model: Model, recordings: Sequence[Recording]) -> dict[str
     return found
 
 
-def _forces(model: Model, recordings: tuple[Recording, ...]) -> tuple[np.ndarray, ForceColumns]:
-    """Forces that the motion needs and the model does not give, shape (rows, joints), and what may add to them.
+def _forces(model: Model, recordings: tuple[Recording, ...]) -> ForceColumns:
+    """Forces that the motion needs and the model does not give, and what may add to them.
 
     Products of smoothed signals are not the smoothed products: they err by the square of the filter's width. So they
     are extrapolated to no width from two of them (Richardson 1911).
@@ -202,10 +206,8 @@ def _forces(model: Model, recordings: tuple[Recording, ...]) -> tuple[np.ndarray
     noise = sensor_noise(recordings, model.plant)
     narrow, wide = (motions(recordings, model.plant, noise, wider=width) for width in (1.0, np.sqrt(2.0)))
     kept = [motion.kept for motion in wide]
-    signals = [signals_of(model, each, kept) for each in (narrow, wide)]
-    columns = [ForceColumns.of(model, each) for each in signals]
-    lacking = [missing(model, *both) for both in zip(signals, (each.inertial for each in columns), strict=True)]
-    return 2.0 * lacking[0] - lacking[1], columns[0].extrapolated(columns[1])
+    columns = [ForceColumns.of(model, signals_of(model, each, kept)) for each in (narrow, wide)]
+    return columns[0].extrapolated(columns[1])
 
 
 def _selected(regression: Regression) -> Fitted:
