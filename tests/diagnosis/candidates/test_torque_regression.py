@@ -95,6 +95,15 @@ def test_a_payload_on_a_link_is_one_and_not_what_several_wrong_numbers_imitate(t
     assert not any(f"link_{link}/com_offset.x" in found for link in ("upper", "lower"))
 
 
+def test_a_weak_drive_is_told_from_friction(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"actuator_elbow/gain": {"k": 0.85}, "shoulder/coulomb": {"F_c": 0.08}}
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["actuator_elbow/gain.k"] == pytest.approx(0.85, abs=0.01)
+    assert found["shoulder/coulomb.F_c"] == pytest.approx(0.08, rel=0.2)
+    assert found.get("elbow/coulomb.F_c", 0.0) < 0.005
+
+
 def test_a_tilted_base_is_told_from_centres_of_mass(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     hidden = {"environment/base_tilt": {"roll": 0.06, "pitch": -0.04}}
