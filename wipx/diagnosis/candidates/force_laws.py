@@ -17,11 +17,25 @@ from wipx.identify.inverse_dynamics import Signals, gravity_regressor, missing, 
 from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import gravity, inertial_numbers
 
-OWN = 6  # columns of a joint: direction of motion, rate, acceleration, coordinate, minus one, needed force
+DIRECTION, RATE, ACCELERATION, COORDINATE, MINUS_ONE, NEEDED = range(6)  # columns of a joint
+OWN = 6  # of them
 SHIFT = 1e-4  # [kg, m, rad], over which slopes are taken
 GAIN = 0.2  # usual error of a drive's gain
+STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
 ARMS = (0.1, 0.2, 0.4, 0.8)  # of the longest link: distances of a mass that are tried
+
+
+def _same(fitted: np.ndarray) -> np.ndarray:
+    return fitted
+
+
+def _one_to_one(fitted: np.ndarray) -> np.ndarray:
+    return np.eye(len(fitted))
+
+
+def _single(sizes: np.ndarray) -> np.ndarray:
+    return sizes[None]
 
 
 @dataclass(frozen=True)
@@ -30,25 +44,25 @@ class ForceLaw:
 
     Attributes:
         columns: Which columns it takes, shape (C,).
-        sizes: Of the columns, shape (C,), from what is fitted, shape (n,).
-        slopes: Of the sizes by what is fitted, shape (C, n), there.
-        starts: Where a fit may start, shape (S, n), from the sizes that fit best without the effect's law.
-        numbers: Its numbers by symbol [SI], from what is fitted.
+        numbers: Its numbers by symbol [SI], from what is fitted, shape (n,).
         low: Lower bounds of what is fitted, shape (n,).
         usual: Its standard deviations about zero beforehand, shape (n,); infinite where any is as likely.
         measured: Symbol of the number that is fitted first; empty for none.
         contains: Effect that it has as a special case; empty for none.
+        sizes: Of the columns, shape (C,), from what is fitted.
+        slopes: Of the sizes by what is fitted, shape (C, n), there.
+        starts: Where a fit may start, shape (S, n), from the sizes that fit best without the effect's law.
     """
 
     columns: np.ndarray
-    sizes: Callable[[np.ndarray], np.ndarray]
-    slopes: Callable[[np.ndarray], np.ndarray]
-    starts: Callable[[np.ndarray], np.ndarray]
     numbers: Callable[[np.ndarray], dict[str, float]]
     low: np.ndarray
     usual: np.ndarray
     measured: str = ""
     contains: str = ""
+    sizes: Callable[[np.ndarray], np.ndarray] = _same
+    slopes: Callable[[np.ndarray], np.ndarray] = _one_to_one
+    starts: Callable[[np.ndarray], np.ndarray] = _single
 
     @property
     def count(self) -> int:
@@ -64,7 +78,7 @@ class ForceColumns:
         lacking: That the motion needs and the model does not give, shape (rows, joints).
         inertial: Per inertial number of each link, shape (rows, joints, 10 N).
         tilt: Per roll and pitch of the base, shape (rows, joints, 2).
-        own: Of each joint alone, shape (rows, joints, 6).
+        own: Of each joint alone, shape (rows, joints, OWN).
     """
 
     lacking: np.ndarray
@@ -127,9 +141,6 @@ def force_laws(model: Model) -> dict[str, ForceLaw]:
     first = NUMBERS * len(tree.links)
     laws["environment/base_tilt"] = ForceLaw(
         np.arange(first, first + 2),
-        _same,
-        _one_to_one,
-        _single,
         lambda fitted: dict(zip(("roll", "pitch"), fitted.tolist(), strict=True)),
         np.full(2, -np.inf),
         np.full(2, np.inf),
@@ -142,32 +153,28 @@ def force_laws(model: Model) -> dict[str, ForceLaw]:
 
 
 def _joint_laws(site: str, first: int) -> dict[str, ForceLaw]:
-    """The laws of a joint and its drive, whose columns begin at `first`."""
+    """The laws of a joint and its drive, whose columns begin at `first`.
+
+    A gain divides the force that the motion needs. If it multiplied the commands, none at all would leave the least.
+    """
     offset = f"actuator_{site}/offset"
-    spring = ForceLaw(
-        np.array([first + 3, first + 4]),
-        _same,
-        _one_to_one,
-        _single,
-        lambda fitted: {"k": float(fitted[0]), "q0": float(fitted[1] / max(fitted[0], 1e-300))},
-        np.array([0.0, -np.inf]),
-        np.full(2, np.inf),
-        "k",
-        offset,
-    )
     return {
-        f"{site}/coulomb": _proportional(first, "F_c"),
-        f"{site}/viscous": _proportional(first + 1, "sigma"),
-        f"{site}/rotor_inertia": _proportional(first + 2, "J"),
-        offset: _proportional(first + 4, "F_0", -np.inf),
-        f"{site}/spring": spring,
+        f"{site}/coulomb": _proportional(first + DIRECTION, "F_c"),
+        f"{site}/viscous": _proportional(first + RATE, "sigma"),
+        f"{site}/rotor_inertia": _proportional(first + ACCELERATION, "J"),
+        offset: _proportional(first + MINUS_ONE, "F_0", -np.inf),
+        f"{site}/spring": ForceLaw(
+            np.array([first + COORDINATE, first + MINUS_ONE]),
+            lambda fitted: {"k": float(fitted[0]), "q0": float(fitted[1] / max(fitted[0], 1e-300))},
+            np.array([0.0, -np.inf]),
+            np.full(2, np.inf),
+            "k",
+            offset,
+        ),
         f"actuator_{site}/gain": ForceLaw(
-            np.array([first + 5]),
-            _same,
-            _one_to_one,
-            _single,
+            np.array([first + NEEDED]),
             lambda fitted: {"k": 1.0 / (1.0 + float(fitted[0]))},
-            np.array([-0.8]),
+            np.array([STRONGEST]),
             np.array([GAIN]),
         ),
     }
@@ -175,28 +182,8 @@ def _joint_laws(site: str, first: int) -> dict[str, ForceLaw]:
 
 def _proportional(column: int, symbol: str, low: float = 0.0) -> ForceLaw:
     """A law of one number to which its force is proportional."""
-    return ForceLaw(
-        np.array([column]),
-        _same,
-        _one_to_one,
-        _single,
-        lambda fitted: {symbol: float(fitted[0])},
-        np.array([low]),
-        np.array([np.inf]),
-        symbol,
-    )
-
-
-def _same(fitted: np.ndarray) -> np.ndarray:
-    return fitted
-
-
-def _one_to_one(fitted: np.ndarray) -> np.ndarray:
-    return np.eye(len(fitted))
-
-
-def _single(sizes: np.ndarray) -> np.ndarray:
-    return sizes[None]
+    none = np.array([np.inf])
+    return ForceLaw(np.array([column]), lambda fitted: {symbol: float(fitted[0])}, np.array([low]), none, symbol)
 
 
 @dataclass(frozen=True)
@@ -273,7 +260,7 @@ def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: f
     laws = {}
     for kind, (begins, low, usual) in starts.items():
         own = _LinkEffect(model, link, kind)
-        laws[own.name] = ForceLaw(columns, own.sizes, own.slopes, begins, own.numbers, low, usual)
+        laws[own.name] = ForceLaw(columns, own.numbers, low, usual, sizes=own.sizes, slopes=own.slopes, starts=begins)
     return laws
 
 
