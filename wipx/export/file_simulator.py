@@ -117,7 +117,7 @@ class _Robot:
         self.data.qpos[self.places], self.data.qvel[self.joints] = state[:count], state[count:]
 
     def _remember(self, t: np.ndarray, commands: np.ndarray, first: int) -> None:
-        """Fill the memories of late inputs with the rows before the first, those of late sensors with the start."""
+        """Fill the memories of late inputs with the rows before the first, those of late sensors at a steady rate."""
         for i, (actuator, _) in enumerate(self.inputs):
             samples = int(self.model.actuator_history[actuator, 0])
             if samples:
@@ -125,14 +125,14 @@ class _Robot:
                 rows = np.clip(np.searchsorted(t, times + 1e-9, side="right") - 1, 0, max(first, 0))
                 values = np.ascontiguousarray(commands[rows, i][:, None])
                 self.mujoco.mj_initCtrlHistory(self.model, self.data, actuator, times[:, None], values)
-        for joint, sensor in zip(self.places, self.sensors, strict=True):
+        for place, joint, sensor in zip(self.places, self.joints, self.sensors, strict=True):
             if sensor is None:
                 continue
             number = int(np.flatnonzero(self.model.sensor_adr == sensor)[0])
             samples = int(self.model.sensor_history[number, 0])
             if samples:
                 times = t[first] - self.step * np.arange(samples, 0, -1.0)
-                values = np.full((samples, 1), self.data.qpos[joint])
+                values = (self.data.qpos[place] + self.data.qvel[joint] * (times - t[first]))[:, None]
                 self.mujoco.mj_initSensorHistory(self.model, self.data, number, times[:, None], values, 0.0)
 
     def _shown(self) -> np.ndarray:
