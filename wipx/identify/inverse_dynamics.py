@@ -73,7 +73,7 @@ def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
         weight: Gravity in the frame of the base, shape (3,) [m/s^2].
     """
     q, v, a = (each.T for each in (signals.coordinates, signals.rates, signals.accelerations))
-    poses = [E.pose(link, q[i], np.sin(q[i]), np.cos(q[i])) for i, link in enumerate(tree.links)]
+    poses = _poses(tree, q)
     pull = (float(weight[0]), float(weight[1]), float(weight[2]))
     found = np.zeros((q.shape[1], len(q), E.NUMBERS * len(q)))
     none = _inertia(np.zeros(E.NUMBERS))
@@ -96,7 +96,7 @@ def gravity_regressor(tree: Tree, signals: Signals, inertial: np.ndarray) -> np.
         inertial: Inertial numbers of all links, shape (10 N,).
     """
     q = signals.coordinates.T
-    poses = [E.pose(link, q[i], np.sin(q[i]), np.cos(q[i])) for i, link in enumerate(tree.links)]
+    poses = _poses(tree, q)
     own = [_inertia(each) for each in inertial.reshape(-1, E.NUMBERS)]
     found = np.zeros((q.shape[1], len(q), 3))
     for axis in range(3):
@@ -104,6 +104,11 @@ def gravity_regressor(tree: Tree, signals: Signals, inertial: np.ndarray) -> np.
         for j, force in enumerate(E.bias(tree, poses, [0.0] * len(q), own, (x, y, z))):
             found[:, j, axis] = np.asarray(force, dtype=float)
     return found
+
+
+def _poses(tree: Tree, q: np.ndarray) -> list[E.Pose]:
+    """Of all links, for coordinates (joints, rows)."""
+    return [E.pose(link, q[i], np.sin(q[i]), np.cos(q[i])) for i, link in enumerate(tree.links)]
 
 
 def _inertia(numbers: np.ndarray) -> E.Inertia:

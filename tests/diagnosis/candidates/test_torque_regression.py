@@ -97,9 +97,14 @@ def test_a_payload_on_a_link_is_one_and_not_what_several_wrong_numbers_imitate(t
 
 def test_a_weak_drive_is_told_from_friction(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
-    hidden = {"actuator_elbow/gain": {"k": 0.85}, "shoulder/coulomb": {"F_c": 0.08}}
+    hidden = {
+        "actuator_elbow/gain": {"k": 0.75},
+        "elbow/viscous": {"sigma": 0.02},
+        "shoulder/coulomb": {"F_c": 0.08},
+    }
     found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
-    assert found["actuator_elbow/gain.k"] == pytest.approx(0.85, abs=0.01)
+    assert found["actuator_elbow/gain.k"] == pytest.approx(0.75, abs=0.01)
+    assert found["elbow/viscous.sigma"] == pytest.approx(0.02, rel=0.05)  # as commanded it would be a third more
     assert found["shoulder/coulomb.F_c"] == pytest.approx(0.08, rel=0.2)
     assert found.get("elbow/coulomb.F_c", 0.0) < 0.005
 

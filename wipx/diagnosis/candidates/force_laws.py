@@ -12,6 +12,7 @@ import numpy as np
 
 from wipx.core.model import Model, ModelBatch
 from wipx.core.tree import Link, Tree
+from wipx.diagnosis.candidates.point_mass_scan import masses_with
 from wipx.effects.catalogue import effect_of
 from wipx.identify.inverse_dynamics import Signals, gravity_regressor, missing, numbers, regressor, weight_of
 from wipx.sim.tree.equations import NUMBERS
@@ -23,7 +24,6 @@ SHIFT = 1e-4  # [kg, m, rad], over which slopes are taken
 GAIN = 0.2  # usual error of a drive's gain
 STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
-ARMS = (0.1, 0.2, 0.4, 0.8)  # of the longest link: distances of a mass that are tried
 
 
 def _same(fitted: np.ndarray) -> np.ndarray:
@@ -246,9 +246,7 @@ def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: f
 
     def masses(sizes: np.ndarray) -> np.ndarray:
         """Several masses with the same first moment."""
-        moment = sizes[1:4]
-        tried = [float(np.linalg.norm(moment)) / (share * longest) for share in ARMS]
-        heavy = np.array([each for each in (*tried, float(sizes[0])) if each > 0.0])[:, None]
+        moment, heavy = sizes[1:4], masses_with(sizes[1:4], float(sizes[0]))[:, None]
         return np.column_stack([heavy, (moment / np.maximum(heavy, 1e-300) - link.body_place) @ link.body_rotation])
 
     starts = {

@@ -40,7 +40,11 @@ def point_masses(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, name: st
     columns -= (columns @ basis) @ basis.T
     amounts = -np.linalg.solve(columns @ columns.T + np.eye(len(columns)) / USUAL**2, columns @ base)
     moment = amounts[1:4] * small * ARM
-    masses = [float(np.linalg.norm(moment)) / distance for distance in DISTANCES]
-    if amounts[0] > 0.0:
-        masses.append(float(amounts[0] * small))
-    return np.array([[mass, *(moment / mass)] for mass in masses if mass > 0.0]).reshape(-1, 4)
+    masses = masses_with(moment, float(amounts[0] * small))
+    return np.column_stack([masses, moment / np.maximum(masses[:, None], 1e-300)])
+
+
+def masses_with(moment: np.ndarray, mass: float) -> np.ndarray:
+    """Masses [kg] that may have a first moment (3,) [kg m], shape (A,): at several distances, and the likeliest one."""
+    tried = np.array([*(np.linalg.norm(moment) / distance for distance in DISTANCES), mass])
+    return tried[tried > 0.0]

@@ -50,10 +50,7 @@ class Fitted:
 
 
 class Regression:
-    """Least squares on the forces of all joints at once.
-
-    What a fit leaves of the force of a joint, `noise` of that joint, counts for the next ones as its noise.
-    """
+    """Least squares on the forces of all joints at once. What a fit leaves of a joint's force counts as its noise."""
 
     def __init__(self, columns: ForceColumns, laws: Mapping[str, ForceLaw]) -> None:
         self.laws, self._columns = laws, columns
@@ -192,9 +189,18 @@ def numbers_by_forces(model: Model, recordings: Sequence[Recording]) -> dict[str
             continue
         fit = chosen if asked else regression.fit(regression.starts_with(chosen, name)[0])
         for symbol, value in law.numbers(fit.numbers[name]).items():
-            deviation = regression.deviation(fit, name) if symbol == law.measured else np.inf
-            found[f"{name}.{symbol}"] = ByForces(value, deviation, asked=asked)
+            if symbol == law.measured:
+                gain = _gain_beside(regression, fit, name)
+                found[f"{name}.{symbol}"] = ByForces(gain * value, gain * regression.deviation(fit, name), asked=asked)
+            else:
+                found[f"{name}.{symbol}"] = ByForces(value, np.inf, asked=asked)
     return found
+
+
+def _gain_beside(regression: Regression, fit: Fitted, effect: str) -> float:
+    """Gain of the drive of the joint at which an effect acts: a regression has forces as the drive is commanded."""
+    drive = f"actuator_{effect.partition('/')[0]}/gain"
+    return regression.laws[drive].numbers(fit.numbers[drive])["k"] if drive in fit.numbers else 1.0
 
 
 def _forces(model: Model, recordings: tuple[Recording, ...]) -> ForceColumns:
@@ -211,14 +217,13 @@ def _forces(model: Model, recordings: tuple[Recording, ...]) -> ForceColumns:
 
 
 def _selected(regression: Regression) -> Fitted:
-    """The effects that are chosen one by one, as long as each is worth its penalty."""
-    chosen = regression.fit({})
-    while True:
+    """The effects that are chosen one by one, as long as each is worth its penalty beside what is then noise."""
+    chosen, seen = regression.fit({}), set[frozenset[str]]()
+    while frozenset(chosen.numbers) not in seen:
+        seen.add(frozenset(chosen.numbers))
         chosen = regression.beside(chosen)
-        better = _with_one_more(regression, chosen)
-        if better is chosen:
-            return chosen
-        chosen = _pruned(regression, better)
+        chosen = _pruned(regression, _with_one_more(regression, chosen))
+    return chosen
 
 
 def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:

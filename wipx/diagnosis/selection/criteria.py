@@ -49,18 +49,17 @@ class Criteria:
     def required_gain(self, smaller: Fit, larger: Fit) -> float:
         """Evidence that the effects which `larger` has beside those of `smaller` must gain [nats]."""
         added = [effect for effect in larger.effects if effect not in smaller.effects]
-        indices = [i for effect in added for i in larger.hypothesis.parameters_of(effect)]
-        penalty = 0.5 * len(indices) * np.log(larger.rows)
-        explained = max(evidence(self.nominal, smaller), 0.0)
-        overstated = inflation(larger, indices)
-        return float(overstated * (penalty + self.fitter.required_beyond_penalty(smaller, larger, explained)))
+        return self._required(smaller, larger, [i for effect in added for i in larger.hypothesis.parameters_of(effect)])
 
     def most_required(self, fit: Fit, effect: str) -> float:
         """Evidence that an effect of a fit must gain beside the others, at most [nats]."""
-        indices = fit.hypothesis.parameters_of(effect)
-        penalty = 0.5 * len(indices) * np.log(fit.rows)
-        explained = max(evidence(self.nominal, fit), 0.0)
-        return float(inflation(fit, indices) * (penalty + self.fitter.required_beyond_penalty(fit, fit, explained)))
+        return self._required(fit, fit, fit.hypothesis.parameters_of(effect))
+
+    def _required(self, smaller: Fit, larger: Fit, numbers: list[int]) -> float:
+        penalty = 0.5 * len(numbers) * np.log(larger.rows)
+        explained = max(evidence(self.nominal, smaller), 0.0)
+        overstated = inflation(larger, numbers)
+        return float(overstated * (penalty + self.fitter.required_beyond_penalty(smaller, larger, explained)))
 
     def score_lead(self, fit: Fit, other: Fit) -> float:
         """Penalised evidence that a fit has beyond another one [nats]."""
