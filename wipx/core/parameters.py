@@ -1,6 +1,7 @@
 """Parameters: a name, a physical dimension, a neutral value and a search interval."""
 
 from dataclasses import dataclass
+from math import pi
 
 UNITS = {
     # dimension: (unit at a sliding joint, unit at a turning joint)
@@ -19,6 +20,7 @@ UNITS = {
     "time": ("s", "s"),
     "moment": ("s", "s"),  # a time of the recording
     "ratio": ("1", "1"),
+    "periods": ("1", "1"),  # per turn of the motor; measured by one period over all that it turns
     "per_coordinate": ("1/m", "1/rad"),
     "per_time": ("1/s", "1/s"),
     "per_load": ("1/N", "1/(N m)"),
@@ -38,6 +40,7 @@ class Scales:
         duration: Length of a recording [s].
         command: Largest force that was commanded [N or N m].
         usual: Mean size of the force that was commanded, weighed by its square [N or N m].
+        turn: Angle between the ends of its way, of the wheel on a rail [rad].
     """
 
     force: float = 1.0
@@ -48,6 +51,7 @@ class Scales:
     duration: float = 10.0
     command: float = 1.0
     usual: float = 1.0
+    turn: float = 2.0 * pi
 
     def of(self, dimension: str) -> float:
         """The characteristic size of a `dimension` of `UNITS`, in its SI unit."""
@@ -67,6 +71,7 @@ class Scales:
             "time": 1.0,
             "moment": self.duration,
             "ratio": 1.0,
+            "periods": 2.0 * pi / self.turn,
             "per_coordinate": 1.0,
             "per_time": 1.0,
             "per_load": 1.0 / self.usual,

@@ -16,13 +16,14 @@ EFFECT = Effect(
     sites=("actuator", "drive"),
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),
+        # What does not repeat on the way of the recordings may be any force that depends on the place.
         Parameter(
             "n",
-            "periods per radian of the wheel (or of the joint, where it turns)",
-            "ratio",
+            "periods per turn of the wheel (or of the joint, where it turns)",
+            "periods",
             1.0,
             1.0,
-            200.0,
+            1000.0,
             6.0,
         ),
         Parameter("phase", "angle of the first crest", "angle", 0.0, -6.3, 6.3, 0.0),

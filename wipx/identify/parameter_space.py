@@ -209,7 +209,10 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     plant, p = model.plant, model.parameters
     speeds = np.concatenate([_speeds(r.t, r[column]) for r in recordings])
     velocity = max(float(np.quantile(np.abs(speeds), 0.99)), 1e-6)
-    travel = max(float(np.quantile(np.abs(np.concatenate([r[column] for r in recordings])), 0.99)), 1e-6)
+    places = np.concatenate([r[column] for r in recordings])
+    travel = max(float(np.quantile(np.abs(places), 0.99)), 1e-6)
+    radius = p["wheel_radius"] if "wheel_radius" in p and not plant.is_angular(site) else 1.0
+    turn = max(float(np.ptp(np.quantile(places, (0.005, 0.995)))) / radius, 1e-6)
     commanded = np.zeros(1)
     if site in plant.actuated:
         command = plant.commands[plant.actuated.index(site)]
@@ -227,7 +230,8 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
     else:
         mass = p.get("body_mass", p.get("link1_mass", 1.0)) or 1.0
         length = p.get("com_height", p.get("link1_length", 1.0))
-    return Scales(force, velocity, travel, mass, length, max(float(r.t[-1]) for r in recordings), largest, usual)
+    longest = max(float(r.t[-1]) for r in recordings)
+    return Scales(force, velocity, travel, mass, length, longest, largest, usual, turn)
 
 
 def _asked(model: Model, site: str, command: np.ndarray, coordinate: np.ndarray) -> np.ndarray:

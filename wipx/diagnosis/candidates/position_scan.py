@@ -22,7 +22,7 @@ REGULARISATION = 1e-9
 
 
 def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
-    """Amplitude [N or N m], periods per radian and phase of likely torque ripple, best first, shape (PEAKS, 3).
+    """Amplitude [N or N m], periods per turn and phase of likely torque ripple, best first, shape (PEAKS, 3).
 
     Args:
         fitter: Of the fit.
@@ -37,7 +37,9 @@ def ripples(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) 
     joints = [plant.joints.index(site) for site in plant.joints_at(effect.partition("/")[0])]
     angles = [motion[plant.coordinates[joint]] / radius for joint in joints]
     way = max(float(np.ptp(angle[rows])) for angle in angles)
-    numbers = max(1.0, TURNED / max(way, 1e-9)) * np.arange(1, FREQUENCIES + 1)
+    step = max(1.0, TURNED / max(way, 1e-9))
+    fewest = np.ceil(2.0 * np.pi / max(way * step, 1e-9))  # one period over the whole way
+    numbers = step * (fewest + np.arange(FREQUENCIES))
     left = left_of(fit, basis)
     found = []
     for begin in range(0, FREQUENCIES, TOGETHER):
