@@ -30,6 +30,7 @@ from wipx.sim.simulator import Rollouts
 
 BANDWIDTHS = (1.0, 3.0, 10.0, 30.0, 100.0)  # [rad/s] from nearly no disturbance to nearly no model
 MOST_KNOWN = 8  # bodies that are kept; each holds as much as a recording for every joint
+RUN_AWAY = 1e12  # [m, rad, m/s, rad/s] where a model that diverges is stopped, so that its squares stay finite
 FEWEST_ROWS = 4  # from which the first rates are read, at least
 
 
@@ -78,7 +79,7 @@ class Smoother:
         late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
         shown = self._followed(batch, filters, group)
-        coordinates, rates = (np.nan_to_num(x.transpose(0, 3, 1, 2)) for x in (shown.coordinates, shown.rates))
+        coordinates, rates = (_in_reach(x.transpose(0, 3, 1, 2)) for x in (shown.coordinates, shown.rates))
         coordinates /= scale
         surprises = self._measured.transpose(0, 2, 1)[..., None] / scale - coordinates
         prior = np.concatenate(
@@ -124,7 +125,7 @@ class Smoother:
         each = self.filtered(model, bandwidth, nowhere)
         shown = self._followed(ModelBatch(model), [each], np.zeros(1, dtype=np.int64))
         joints = self._measured.shape[1]
-        surprises = np.nan_to_num(self._measured - shown.coordinates[:, :, 0]) / scales_of(ModelBatch(model))
+        surprises = _in_reach(self._measured - shown.coordinates[:, :, 0]) / scales_of(ModelBatch(model))
         return np.cumsum(np.einsum("krij,kjr->kir", each.along.gains[:, :, 2 * joints :], surprises), axis=0)
 
     def _followed(self, batch: ModelBatch, filters: Sequence[Filter], group: np.ndarray) -> Rollouts:
@@ -212,3 +213,8 @@ class Smoother:
                 course = np.polynomial.Polynomial.fit(t[:count], recording[name][:count], min(2, count - 1))
                 shown[j, :, r], shown[joints + j, :, r] = course(late[j]), course.deriv()(late[j])
         return true_states(batch, shown)
+
+
+def _in_reach(values: np.ndarray) -> np.ndarray:
+    """The same without what is not finite: where nothing is known zero, where a model diverges a large number."""
+    return np.clip(np.nan_to_num(values), -RUN_AWAY, RUN_AWAY)
