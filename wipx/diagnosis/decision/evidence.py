@@ -82,12 +82,12 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
 
 
 def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: Watcher) -> Found:
-    """What innovations chose, if its laws hold; else the better one of that and what forecasts find."""
+    """What innovations chose, if its laws hold, those from beyond the vocabulary too; else that or what forecasts find."""
     watcher("what is left over", 0.5)
     context = context.trusting(chosen.fit)
     by_row = Found(context, search, *decided(context, search, chosen))
     fitter = _forecasting(context, chosen.fit)
-    if not fitter.is_possible or (not by_row.rest.significant and context.is_trusted(by_row.rest.fit)):
+    if not fitter.is_possible or (by_row.rest.strongest is None and context.is_trusted(by_row.rest.fit)):
         return by_row
     watcher("predictions of half a second", 0.6)
     return _better(by_row, fitter, *_by_forecasts(context, fitter, chosen.fit))
