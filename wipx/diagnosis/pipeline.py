@@ -102,8 +102,11 @@ def diagnose(
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
     context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)
+    nominal = context.by_row.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
+    if setting.nominal.plant.tree is not None and robot.feedback is None and context.rows_are_means(nominal):
+        context = context.with_means()
+        nominal = context.by_row.first_fit(nominal.hypothesis, nominal.levels)
     fitter = context.by_row
-    nominal = fitter.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
     store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)
     if context.is_driven and setting.nominal.plant.tree is None:
@@ -125,6 +128,6 @@ def diagnose(
         answer = replace(answer, suspects=asked(context, search, rest, answer, suspected))
     watcher("done", 1.0)
     seconds = time.perf_counter() - begun
-    return replace(
-        answer, title=title, source=source, notes=caveats(recordings, rules.answer, context.cut_off), seconds=seconds
-    )
+    guessed = context.data.has_means and not any(recording.periods > 1 for recording in recordings)
+    notes = caveats(recordings, rules.answer, context.cut_off, guessed_means=guessed)
+    return replace(answer, title=title, source=source, notes=notes, seconds=seconds)

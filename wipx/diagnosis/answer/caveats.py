@@ -7,14 +7,19 @@ from wipx.diagnosis.rules import USUAL, AnswerRules
 
 
 def caveats(
-    recordings: tuple[Recording, ...], rules: AnswerRules = USUAL.answer, cut_off: float | None = None
+    recordings: tuple[Recording, ...],
+    rules: AnswerRules = USUAL.answer,
+    cut_off: float | None = None,
+    *,
+    guessed_means: bool = False,
 ) -> tuple[str, ...]:
-    """One sentence for each: a single recording, low-passed signals, missing rows, uneven time steps.
+    """One sentence for each: a single recording, low-passed signals, mean commands, missing rows, uneven time steps.
 
     Args:
         recordings: Of one robot.
         rules: What is said.
         cut_off: Frequency above which no signal has any power [Hz]; None where they have.
+        guessed_means: Whether the log turned out to be slower than the controller.
     """
     said = []
     if len(recordings) == 1:
@@ -26,6 +31,11 @@ def caveats(
         said.append(
             f"All signals were low-passed before they were logged: they have hardly any power above {cut_off:.2g} Hz. "
             "Gravity, friction and gains show; noise, delays, sticking and backlash do not."
+        )
+    if guessed_means:
+        said.append(
+            "The log seems to be slower than the controller: each row counts as the mean of several commands. "
+            "Log every command to see more."
         )
     missing = {one.name: _missing(one, rules.gap) for one in recordings}
     missing = {name: rows for name, rows in missing.items() if rows}

@@ -82,7 +82,7 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
 
 
 def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: Watcher) -> Found:
-    """What innovations chose, if its laws hold, those from beyond the vocabulary too; else that or what forecasts find."""
+    """What innovations chose, if its laws hold, foreign ones too; else the better of that and what forecasts find."""
     watcher("what is left over", 0.5)
     context = context.trusting(chosen.fit)
     by_row = Found(context, search, *decided(context, search, chosen))
