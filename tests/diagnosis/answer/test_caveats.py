@@ -44,3 +44,8 @@ def test_low_passed_signals_are_told_with_what_they_hide():
     (said,) = caveats((even("r1.csv"), even("r2.csv")), cut_off=3.04)
     assert "above 3 Hz" in said
     assert "backlash" in said
+
+
+def test_a_log_that_turned_out_slow_is_told():
+    (said,) = caveats((even("r1.csv"), even("r2.csv")), guessed_means=True)
+    assert "slower than the controller" in said

@@ -3,11 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
-from diagnosis.recorded import SIMULATOR, bench, coloured
+import pytest
+from diagnosis.recorded import SIMULATOR, Bench, bench, coloured, thinned
+from identify.emulated_robot import nominal_model
 
+from wipx.core.model import ModelBatch
+from wipx.core.recording import Recording
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.rules import USUAL
+from wipx.sim.inputs import Inputs
 
 
 def test_a_model_that_predicts_far_worse_than_the_nominal_one_is_not_trusted(fresh_seed: int):
@@ -49,3 +54,21 @@ def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed:
     assert context.errors(fit).times_the_floor > USUAL.trust.near_floor
     assert context.unruly_joints(fit) == ()
     assert context.is_trusted(fit)
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_log_that_is_slower_than_the_controller_is_recognised(every: int, fresh_seed: int):
+    """Single commands of one joint shake the other joint too, which noise of the sensors does not."""
+    rng = np.random.default_rng(fresh_seed)
+    t, nominal, hanging = np.arange(0.0, 8.0, 0.004), nominal_model("double_pendulum"), np.array([np.pi, 0.0, 0.0, 0.0])
+    logged = []
+    for number in range(3):
+        u = 0.2 * np.sin(2.0 * np.pi * np.outer(t, rng.uniform(0.5, 1.5, 2))) + rng.normal(0.0, 0.3, (len(t), 2))
+        run = SIMULATOR.replay(ModelBatch(nominal), Inputs.of([t], [u], [0]), hanging[:, None, None])
+        q = run.coordinates[:, :, 0, 0] + rng.normal(0.0, 1e-6, (len(t), 2))
+        columns = {"t": t, "theta1": q[:, 0], "theta2": q[:, 1], "u1": u[:, 0], "u2": u[:, 1]}
+        slower = thinned(Recording(f"r{number}.csv", columns), np.arange(0, len(t), every))
+        logged.append(replace(slower, periods=1))
+    case = Bench(nominal, tuple(logged), {})
+    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    assert context.rows_are_means(case.fit()) == (every > 1)
