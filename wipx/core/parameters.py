@@ -20,7 +20,7 @@ UNITS = {
     "time": ("s", "s"),
     "moment": ("s", "s"),  # a time of the recording
     "ratio": ("1", "1"),
-    "periods": ("1", "1"),  # per turn of the motor; measured by one period over all that it turns
+    "periods": ("1", "1"),  # per turn of the motor; the unit is one period over its whole way
     "per_coordinate": ("1/m", "1/rad"),
     "per_time": ("1/s", "1/s"),
     "per_load": ("1/N", "1/(N m)"),
@@ -40,7 +40,7 @@ class Scales:
         duration: Length of a recording [s].
         command: Largest force that was commanded [N or N m].
         usual: Mean size of the force that was commanded, weighed by its square [N or N m].
-        turn: Angle between the ends of its way, of the wheel on a rail [rad].
+        turn: Angle between the ends of its way; of the wheel, where the joint slides on one [rad].
     """
 
     force: float = 1.0

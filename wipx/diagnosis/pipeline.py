@@ -103,9 +103,10 @@ def diagnose(
     context = Context.of(halves, setting, simulator, rules)
     watcher("noise of the nominal model", 0.02)
     nominal = context.by_row.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
-    if setting.nominal.plant.tree is not None and robot.feedback is None and context.rows_are_means(nominal):
-        context = context.with_means()
-        nominal = context.by_row.first_fit(nominal.hypothesis, nominal.levels)
+    if setting.nominal.plant.tree is not None and robot.feedback is None:
+        as_logged, context = context, context.reading_means(nominal)
+        if context is not as_logged:
+            nominal = context.by_row.first_fit(nominal.hypothesis, nominal.levels)
     fitter = context.by_row
     store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)

@@ -16,7 +16,7 @@ EFFECT = Effect(
     sites=("actuator", "drive"),
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),
-        # What does not repeat on the way of the recordings may be any force that depends on the place.
+        # At least one period on the recorded way: less of a wave may be any force that depends on the place.
         Parameter(
             "n",
             "periods per turn of the wheel (or of the joint, where it turns)",

@@ -216,5 +216,5 @@ class Smoother:
 
 
 def _in_reach(values: np.ndarray) -> np.ndarray:
-    """The same without what is not finite: where nothing is known zero, where a model diverges a large number."""
+    """The same in finite numbers: zero where nothing is recorded, at most `RUN_AWAY` where a model diverges."""
     return np.clip(np.nan_to_num(values), -RUN_AWAY, RUN_AWAY)

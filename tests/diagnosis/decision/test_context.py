@@ -71,4 +71,4 @@ def test_a_log_that_is_slower_than_the_controller_is_recognised(every: int, fres
         logged.append(replace(slower, periods=1))
     case = Bench(nominal, tuple(logged), {})
     context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
-    assert context.rows_are_means(case.fit()) == (every > 1)
+    assert context.reading_means(case.fit()).data.has_means == (every > 1)

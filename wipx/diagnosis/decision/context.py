@@ -56,25 +56,24 @@ class Context:
         fitter = InnovationFitter(InnovationsModel.of(engine, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(engine, noise, HORIZON), recordings)
 
-    def with_means(self) -> "Context":
-        """The same as if rows had the means of two commands each, not the commands that were held."""
+    def reading_means(self, held: Fit) -> "Context":
+        """The same with rows that have means of commands, if the recordings are far likelier so; else itself.
+
+        If the log is slower than the controller, single commands shake the joints within a row, several at once.
+
+        Args:
+            held: A fit by innovations, of commands that were held over each row.
+        """
         recordings = tuple(replace(recording, periods=2) for recording in self.recordings)
         data = RecordingBatch.of(recordings, self.data.plant)
         model = InnovationsModel.of(self.by_row.simulator, data, self.setting.nominal)
+        shaken = replace(self.by_row.innovations_model, jolts=model.jolts, _known={})
+        fitter = replace(self.by_row, innovations_model=shaken)
+        again = fitter.converged(fitter.fit(held.hypothesis, held.levels))
+        if again.log_likelihood - held.log_likelihood <= self.rules.selection.least_gain:
+            return self
         fitter = replace(self.by_row, innovations_model=model)
         return replace(self, fitter=fitter, by_row=fitter, recordings=recordings)
-
-    def rows_are_means(self, fit: Fit) -> bool:
-        """Whether the log is slower than the controller: rows are likelier if single commands shook the body unseen.
-
-        Args:
-            fit: By innovations, of commands that were held.
-        """
-        held = self.by_row.innovations_model
-        shaken = replace(held, jolts=self.with_means().by_row.innovations_model.jolts, _known={})
-        fitter = replace(self.by_row, innovations_model=shaken)
-        again = fitter.converged(fitter.fit(fit.hypothesis, fit.levels))
-        return again.log_likelihood - fit.log_likelihood > self.rules.selection.least_gain
 
     def beside(self, search: Search) -> "Context":
         """The same for the part of a robot that a search looks at."""
