@@ -79,9 +79,11 @@ def _draw_leading_law(panel: SubFigure, diagnosis: Diagnosis) -> None:
         _draw_map(panel, diagnosis.location.map)
     else:
         errors = judged_errors(diagnosis)
-        for axes, row in zip(np.atleast_1d(panel.subplots(max(len(errors), 1), 1)), errors, strict=False):
+        count = max(len(errors), 1)
+        for axes, row in zip(np.atleast_1d(panel.subplots(count, 1, sharex=True)), errors, strict=False):
             heights = (row.nominal, row.completed, row.noise_floor)
-            draw_errors(axes, heights, title=with_unit(f"error of {row.signal}", row.scale.unit))
+            title = with_unit(f"error of {row.signal}", row.scale.unit)
+            draw_errors(axes, heights, title, room=0.1 + 0.1 * count)  # low panels leave a number less room
 
 
 def _draw_curve(axes: Axes, titled: TitledCurve) -> None:

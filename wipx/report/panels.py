@@ -77,8 +77,15 @@ def _change(trace: Trace, column: str, unit: str) -> str:
     return f"{before} \N{RIGHTWARDS ARROW} {after} {scale.unit}"
 
 
-def draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) -> None:
-    """Draw the errors of nominal model, completed model and noise floor as bars."""
+def draw_errors(axes: Axes, heights: tuple[float, float, float], title: str, *, room: float = 0.18) -> None:
+    """Draw the errors of nominal model, completed model and noise floor as bars.
+
+    Args:
+        axes: Where.
+        heights: The errors, in the unit of the title.
+        title: Above the bars.
+        room: Above the highest bar, for its number, as a share of its height.
+    """
     quiet(axes)
     finite = [height if np.isfinite(height) else 0.0 for height in heights]
     bars = axes.bar(("nominal", "completed", "noise\nfloor"), finite, color=(NOMINAL, COMPLETED, FLOOR), width=0.72)
@@ -86,7 +93,7 @@ def draw_errors(axes: Axes, heights: tuple[float, float, float], title: str) -> 
     if wants_logarithm(finite):
         axes.set_yscale("log")
         title = f"{title}, log scale"
-    axes.margins(y=0.18)
+    axes.margins(y=room)
     axes.grid(visible=False)
     axes.spines["left"].set_visible(False)
     axes.tick_params(left=False, labelleft=False, which="both")
