@@ -49,8 +49,27 @@ def signals_of(model: Model, motions: Sequence[Motion], kept: Sequence[slice] | 
 
 
 def _signals(model: Model, motion: Motion, kept: slice) -> tuple[np.ndarray, ...]:
+    slides = motion.filtered(np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0))
+    parts = (
+        motion.coordinates,
+        motion.rates,
+        motion.accelerations,
+        motion.filtered(commanded_forces(model, motion)),
+        slides,
+    )
+    return tuple(part[kept] for part in parts)
+
+
+def commanded_forces(model: Model, motion: Motion, delay: float = 0.0) -> np.ndarray:
+    """Forces of the drives, as commanded a `delay` [s] before, not filtered, shape (N, joints).
+
+    Args:
+        model: See `signals_of`.
+        motion: A smoothed recording.
+        delay: Of the commands.
+    """
     plant = model.plant
-    forces, commands = np.zeros_like(motion.coordinates), motion.commands()
+    forces, commands = np.zeros_like(motion.coordinates), motion.commands(delay)
     for i, site in enumerate(plant.actuated):
         j, drive = plant.joints.index(site), plant.drives[site]
         if drive.kind == "position":
@@ -59,9 +78,7 @@ def _signals(model: Model, motion: Motion, kept: slice) -> tuple[np.ndarray, ...
             forces[:, j] = force if drive.limit is None else np.clip(force, -drive.limit, drive.limit)
         else:
             forces[:, j] = model.parameters[f"{site}.gain"] * commands[:, i]
-    slides = motion.filtered(np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0))
-    parts = (motion.coordinates, motion.rates, motion.accelerations, motion.filtered(forces), slides)
-    return tuple(part[kept] for part in parts)
+    return forces
 
 
 def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
@@ -72,19 +89,27 @@ def regressor(tree: Tree, signals: Signals, weight: np.ndarray) -> np.ndarray:
         signals: Motion.
         weight: Gravity in the frame of the base, shape (3,) [m/s^2].
     """
+    count = E.NUMBERS * len(tree.links)
+    return np.stack([inverse_dynamics(tree, signals, one, weight) for one in np.eye(count)], axis=2)
+
+
+def inverse_dynamics(tree: Tree, signals: Signals, inertial: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Forces of the joints that links need for a motion, shape (rows, joints) [N m or N].
+
+    Args:
+        tree: Links and joints.
+        signals: Motion.
+        inertial: Inertial numbers of all links, shape (10 N,).
+        weight: Gravity in the frame of the base, shape (3,) [m/s^2].
+    """
     q, v, a = (each.T for each in (signals.coordinates, signals.rates, signals.accelerations))
     poses = _poses(tree, q)
+    own = [_inertia(each) for each in inertial.reshape(-1, E.NUMBERS)]
     pull = (float(weight[0]), float(weight[1]), float(weight[2]))
-    found = np.zeros((q.shape[1], len(q), E.NUMBERS * len(q)))
-    none = _inertia(np.zeros(E.NUMBERS))
-    for column in range(found.shape[2]):
-        own = [none] * len(q)
-        own[column // E.NUMBERS] = _inertia(np.eye(E.NUMBERS)[column % E.NUMBERS])
-        inertial = E.product(tree, E.mass_matrix(tree, poses, own, [0.0] * len(q)), list(a))
-        velocity = E.bias(tree, poses, list(v), own, pull)
-        for j in range(len(q)):
-            found[:, j, column] = np.asarray(inertial[j] + velocity[j], dtype=float)
-    return found
+    accelerating = E.product(tree, E.mass_matrix(tree, poses, own, [0.0] * len(q)), list(a))
+    others = E.bias(tree, poses, list(v), own, pull)
+    needed = (np.asarray(x + y, dtype=float) for x, y in zip(accelerating, others, strict=True))
+    return np.stack([np.broadcast_to(force, q.shape[1]) for force in needed], axis=1)
 
 
 def gravity_regressor(tree: Tree, signals: Signals, inertial: np.ndarray) -> np.ndarray:
@@ -124,18 +149,18 @@ def numbers(model: Model) -> np.ndarray:
     return np.concatenate([inertial_numbers(batch, link)[:, 0] for link in tree.links])
 
 
-def missing(model: Model, signals: Signals, carried: np.ndarray) -> np.ndarray:
+def missing(model: Model, signals: Signals, carried: np.ndarray | None = None) -> np.ndarray:
     """Forces that the motion needs and the model does not give, shape (rows, joints) [N m or N].
 
     Args:
         model: Its links with their effects; of its joints and drives viscous and Coulomb friction, rotor inertias,
             gains and offsets. Other effects are not seen.
         signals: Motion and forces.
-        carried: Of `regressor`.
+        carried: Of `regressor`; None where nobody has it.
     """
-    plant = model.plant
+    plant, own = model.plant, numbers(model)
     assert plant.tree is not None
-    needed = carried @ numbers(model)
+    needed = inverse_dynamics(plant.tree, signals, own, weight_of(model)) if carried is None else carried @ own
     for j, link in enumerate(plant.tree.links):
         site, drive = link.joint, f"actuator_{link.joint}"
         rotor = model.parameters[f"{site}.armature"] + _of(model, f"{site}/rotor_inertia", "J")

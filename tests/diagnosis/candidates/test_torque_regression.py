@@ -109,6 +109,72 @@ def test_a_weak_drive_is_told_from_friction(tmp_path: Path, fresh_seed: int):
     assert found.get("elbow/coulomb.F_c", 0.0) < 0.005
 
 
+def test_late_commands_and_late_drives_are_told_apart(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"actuator_shoulder/delay": {"tau": 0.017}, "actuator_elbow/lag": {"tau": 0.03}}
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["actuator_shoulder/delay.tau"] == pytest.approx(0.017, rel=0.05)
+    assert found["actuator_elbow/lag.tau"] == pytest.approx(0.03, rel=0.2)  # between those that have a column
+    assert "actuator/delay.tau" not in found
+
+
+def test_a_delay_of_all_drives_is_one_delay(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    found = asked_for(model, (recorded(model.with_effects({"actuator/delay": {"tau": 0.008}}), fresh_seed),))
+    assert found["actuator/delay.tau"] == pytest.approx(0.008, rel=0.05)
+    assert not any(f"actuator_{joint}/delay.tau" in found for joint in ("shoulder", "elbow"))
+
+
+def test_a_drive_that_gives_no_more_and_one_that_ignores_small_commands(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"actuator_shoulder/saturation": {"F_max": 0.8}, "actuator_elbow/dead_zone": {"band": 0.06}}
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["actuator_shoulder/saturation.F_max"] == pytest.approx(0.8, rel=0.05)
+    assert found["actuator_elbow/dead_zone.band"] == pytest.approx(0.06, rel=0.1)
+    assert not any(f"actuator_{joint}/gain.k" in found for joint in ("shoulder", "elbow"))
+
+
+def test_friction_of_a_loaded_gear_and_friction_that_falls_with_speed(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {
+        "shoulder/load_friction": {"K_motor": 0.15, "K_external": 0.0},
+        "elbow/stribeck": {"F_c": 0.02, "F_s": 0.05, "v_s": 0.5},
+    }
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["shoulder/load_friction.K_motor"] + found["shoulder/load_friction.K_external"] == pytest.approx(
+        0.15, rel=0.2
+    )
+    assert found["elbow/stribeck.F_c"] == pytest.approx(0.02, rel=0.5)
+    assert found["elbow/stribeck.F_s"] > 1.5 * found["elbow/stribeck.F_c"]
+
+
+def test_a_sensor_that_is_late_and_one_that_shows_too_much(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"sensor_elbow/delay": {"tau": 0.006}, "sensor_shoulder/scale": {"e": 0.04}}
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["sensor_elbow/delay.tau"] == pytest.approx(0.006, rel=0.2)
+    assert found["sensor_shoulder/scale.e"] == pytest.approx(0.04, rel=0.2)
+
+
+def test_a_position_drive_that_is_stiffer_than_believed(tmp_path: Path, fresh_seed: int):
+    (tmp_path / "arm.xml").write_text(ARM, encoding="utf-8")
+    servo = {"kind": "position", "kp": 20.0, "kd": 0.5}
+    mapping = {"plant": "robot", "model": "arm.xml", "drives": {"shoulder": servo, "elbow": servo}}
+    model = robot_from_mapping(mapping, "robot.yaml", tmp_path).model
+    found = asked_for(model, (recorded(model.with_effects({"actuator_elbow/kp": {"factor": 1.3}}), fresh_seed),))
+    assert found["actuator_elbow/kp.factor"] == pytest.approx(1.3, abs=0.03)
+    assert "actuator_shoulder/kp.factor" not in found
+
+
+def test_what_makes_a_joint_weightless_explains_nothing(tmp_path: Path, fresh_seed: int):
+    """A joint that is five times lighter behind a drive without force would leave hardly any error in the forces."""
+    model = arm(tmp_path)
+    found = asked_for(model, (recorded(model.with_effects({"actuator_elbow/backlash": {"gap": 0.05}}), fresh_seed),))
+    assert 0.5 < found.get("actuator_elbow/gain.k", 1.0) < 2.0
+    assert found.get("actuator_elbow/dead_zone.band", 0.0) < 0.1
+    assert found.get("actuator_elbow/saturation.F_max", 1.0) > 0.05
+
+
 def test_a_tilted_base_is_told_from_centres_of_mass(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     hidden = {"environment/base_tilt": {"roll": 0.06, "pitch": -0.04}}

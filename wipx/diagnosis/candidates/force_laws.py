@@ -1,27 +1,47 @@
-"""What effects of links, joints and drives add to the forces that a recorded motion needs.
+"""What effects of links, joints, drives and sensors add to the forces that a recorded motion needs.
 
 All of it is a sum of columns: forces per unit of the inertial numbers of the links (Atkeson, An, Hollerbach 1986, IJRR
-5(3)), of gravity's direction, and of what a joint lacks by itself. An effect says how much it takes of each column.
+5(3)), of gravity's direction, of sensor errors, and of what a joint lacks by itself. An effect says how much it takes
+of each column.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
-from wipx.core.tree import Link, Tree
+from wipx.core.tree import Link
+from wipx.diagnosis.candidates.force_columns import (
+    ACCELERATION,
+    BUMPS,
+    CLIPPED,
+    COORDINATE,
+    DELAYED,
+    DELAYS,
+    DIRECTION,
+    DRAG,
+    LAGGED,
+    LAGS,
+    LOAD,
+    MINUS_ONE,
+    MOTOR,
+    NEEDED,
+    OWN,
+    RATE,
+    SENSOR,
+    STIFFNESS,
+    Ranges,
+    tree_of,
+)
 from wipx.diagnosis.candidates.point_mass_scan import masses_with
 from wipx.effects.catalogue import effect_of
-from wipx.identify.inverse_dynamics import Signals, gravity_regressor, missing, numbers, regressor, weight_of
 from wipx.sim.tree.equations import NUMBERS
-from wipx.sim.tree.inertias import gravity, inertial_numbers
+from wipx.sim.tree.inertias import inertial_numbers
 
-DIRECTION, RATE, ACCELERATION, COORDINATE, MINUS_ONE, NEEDED = range(6)  # columns of a joint
-OWN = 6  # of them
-SHIFT = 1e-4  # [kg, m, rad], over which slopes are taken
-GAIN = 0.2  # usual error of a drive's gain
+SHIFT = 1e-4  # [kg, m], over which slopes are taken
+GAIN = 0.2  # usual error of a drive's gain or stiffness
 STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
 
@@ -47,6 +67,7 @@ class ForceLaw:
         numbers: Its numbers by symbol [SI], from what is fitted, shape (n,).
         low: Lower bounds of what is fitted, shape (n,).
         usual: Its standard deviations about zero beforehand, shape (n,); infinite where any is as likely.
+        high: Upper bounds of what is fitted, shape (n,); None for none.
         measured: Symbol of the number that is fitted first; empty for none.
         contains: Effect that it has as a special case; empty for none.
         sizes: Of the columns, shape (C,), from what is fitted.
@@ -58,6 +79,7 @@ class ForceLaw:
     numbers: Callable[[np.ndarray], dict[str, float]]
     low: np.ndarray
     usual: np.ndarray
+    high: np.ndarray | None = None
     measured: str = ""
     contains: str = ""
     sizes: Callable[[np.ndarray], np.ndarray] = _same
@@ -70,120 +92,170 @@ class ForceLaw:
         return len(self.low)
 
 
-@dataclass(frozen=True, eq=False)
-class ForceColumns:
-    """Forces of the joints per unit of every size, and what they add up to.
+@dataclass(frozen=True)
+class _Nodes:
+    """Values of a number at which its law has a column, and zero, where it does nothing.
 
     Attributes:
-        lacking: That the motion needs and the model does not give, shape (rows, joints).
-        inertial: Per inertial number of each link, shape (rows, joints, 10 N).
-        tilt: Per roll and pitch of the base, shape (rows, joints, 2).
-        own: Of each joint alone, shape (rows, joints, OWN).
+        at: Rising, shape (K,) [SI].
     """
 
-    lacking: np.ndarray
-    inertial: np.ndarray
-    tilt: np.ndarray
-    own: np.ndarray
+    at: np.ndarray
 
-    @classmethod
-    def of(cls, model: Model, signals: Signals) -> "ForceColumns":
-        """Those of a recorded motion."""
-        tree = _tree_of(model)
-        constant = np.ones_like(signals.rates)
-        inertial = regressor(tree, signals, weight_of(model))
-        lacking = missing(model, signals, inertial)
-        needed = lacking + signals.forces
-        own = [signals.slides, signals.rates, signals.accelerations, signals.coordinates, -constant, needed]
-        tilted = gravity_regressor(tree, signals, numbers(model)) @ _tilts(model, tree)
-        return cls(lacking, inertial, tilted, np.stack(own, axis=2))
+    def weights(self, value: float) -> np.ndarray:
+        """Of the columns, shape (K,), by linear interpolation."""
+        hats = np.eye(len(self.at) + 1)[1:]
+        return np.array([np.interp(value, [0.0, *self.at], hat) for hat in hats])
 
-    def extrapolated(self, wider: "ForceColumns") -> "ForceColumns":
-        """Without the bias of the filter, from the same columns behind a filter that is wider by the root of two."""
-        names = [each.name for each in fields(self)]
-        return ForceColumns(*(2.0 * getattr(self, name) - getattr(wider, name) for name in names))
-
-    @property
-    def count(self) -> int:
-        """Number of columns."""
-        return self.inertial.shape[2] + self.tilt.shape[2] + self.own.shape[1] * self.own.shape[2]
-
-    @property
-    def sizes(self) -> np.ndarray:
-        """Sum of squares of every column, shape (count,)."""
-        parts = (np.sum(each**2, axis=(0, 1)).ravel() for each in (self.inertial, self.tilt))
-        return np.concatenate([*parts, np.sum(self.own**2, axis=0).ravel()])
-
-    def of_joint(self, j: int) -> np.ndarray:
-        """All columns in the force of one joint, shape (rows, count)."""
-        alone = np.zeros((len(self.own), *self.own.shape[1:]))
-        alone[:, j] = self.own[:, j]
-        return np.concatenate([self.inertial[:, j], self.tilt[:, j], alone.reshape(len(alone), -1)], axis=1)
-
-    def left(self, sizes: np.ndarray) -> np.ndarray:
-        """Force that stays at each joint, shape (rows, joints), for sizes (count,)."""
-        ends = np.cumsum([self.inertial.shape[2], self.tilt.shape[2]])
-        inertial, tilt, own = np.split(sizes, ends)
-        return (
-            self.lacking
-            + self.inertial @ inertial
-            + self.tilt @ tilt
-            + np.sum(self.own * own.reshape(self.own.shape[1:]), axis=2)
-        )
+    def slopes(self, value: float) -> np.ndarray:
+        """Of the weights by the value, shape (K,)."""
+        places = np.array([0.0, *self.at])
+        k = int(np.clip(np.searchsorted(places, value, side="right"), 1, len(self.at)))
+        steep = np.zeros(len(places))
+        steep[[k - 1, k]] = np.array([-1.0, 1.0]) / (places[k] - places[k - 1])
+        return steep[1:]
 
 
-def force_laws(model: Model) -> dict[str, ForceLaw]:
+def force_laws(model: Model, ranges: Ranges) -> dict[str, ForceLaw]:
     """The laws of the effects "site/kind" that are sums of columns."""
-    tree = _tree_of(model)
+    tree = tree_of(model)
     longest = max(float(np.linalg.norm(link.place)) for link in tree.links) or 1.0
     heaviest = max(link.mass for link in tree.links)
-    laws: dict[str, ForceLaw] = {}
-    first = NUMBERS * len(tree.links)
-    laws["environment/base_tilt"] = ForceLaw(
-        np.arange(first, first + 2),
-        lambda fitted: dict(zip(("roll", "pitch"), fitted.tolist(), strict=True)),
-        np.full(2, -np.inf),
-        np.full(2, np.inf),
-    )
+    tilt = NUMBERS * len(tree.links)
+    sensors = tilt + 2
+    joints = sensors + SENSOR * len(tree.links)
+    laws = {"environment/base_tilt": _linear(tilt + np.arange(2), ("roll", "pitch"))}
+    delays, timed = _Nodes(np.array(DELAYS)), []
     for i, link in enumerate(tree.links):
-        laws |= _joint_laws(link.joint, first + 2 + OWN * i)
+        first, drive = joints + OWN * i, f"actuator_{link.joint}"
+        laws |= _joint_laws(link.joint, first, _Nodes(ranges.stribeck_speeds[:, i]))
+        laws |= _drive_laws(drive, first, _Nodes(ranges.limits[:, i]))
+        laws[f"{drive}/delay"] = _interpolated(first + DELAYED, "tau", delays)
+        timed.append(first + DELAYED)
+        laws |= _sensor_laws(f"sensor_{model.plant.columns[link.joint]}", sensors + SENSOR * i)
         if link.mass:
             laws |= _link_laws(model, link, NUMBERS * i, longest, heaviest)
+    laws["actuator/delay"] = _interpolated(np.stack(timed), "tau", delays)
     return laws
 
 
-def _joint_laws(site: str, first: int) -> dict[str, ForceLaw]:
-    """The laws of a joint and its drive, whose columns begin at `first`.
+def _joint_laws(site: str, first: int, speeds: _Nodes) -> dict[str, ForceLaw]:
+    """The laws of a joint, whose columns begin at `first`."""
 
-    A gain divides the force that the motion needs. If it multiplied the commands, none at all would leave the least.
-    """
-    offset = f"actuator_{site}/offset"
+    def stribeck(fitted: np.ndarray) -> np.ndarray:
+        level, peak, speed = fitted
+        return np.array([level, *peak * speeds.weights(speed)])
+
+    def stribeck_slopes(fitted: np.ndarray) -> np.ndarray:
+        _, peak, speed = fitted
+        slopes = np.zeros((1 + len(BUMPS), 3))
+        slopes[0, 0] = 1.0
+        slopes[1:, 1], slopes[1:, 2] = speeds.weights(speed), peak * speeds.slopes(speed)
+        return slopes
+
+    def stribeck_starts(sizes: np.ndarray) -> np.ndarray:
+        level, peak = max(sizes[0], 0.0), max(sizes[1:].sum(), 0.1 * abs(sizes[0]))
+        return np.array([[level, peak, speed] for speed in speeds.at])
+
     return {
         f"{site}/coulomb": _proportional(first + DIRECTION, "F_c"),
         f"{site}/viscous": _proportional(first + RATE, "sigma"),
         f"{site}/rotor_inertia": _proportional(first + ACCELERATION, "J"),
-        offset: _proportional(first + MINUS_ONE, "F_0", -np.inf),
+        f"{site}/quadratic_drag": _proportional(first + DRAG, "c"),
+        f"{site}/load_friction": _linear(first + np.array([MOTOR, LOAD]), ("K_motor", "K_external"), 0.0),
         f"{site}/spring": ForceLaw(
             np.array([first + COORDINATE, first + MINUS_ONE]),
             lambda fitted: {"k": float(fitted[0]), "q0": float(fitted[1] / max(fitted[0], 1e-300))},
             np.array([0.0, -np.inf]),
             np.full(2, np.inf),
-            "k",
-            offset,
+            measured="k",
+            contains=f"actuator_{site}/offset",
         ),
-        f"actuator_{site}/gain": ForceLaw(
+        f"{site}/stribeck": ForceLaw(
+            np.array([first + DIRECTION, *first + BUMPS]),
+            lambda fitted: {"F_c": fitted[0], "F_s": fitted[0] + fitted[1], "v_s": fitted[2]},
+            np.array([0.0, 0.0, 0.5 * speeds.at[0]]),
+            np.full(3, np.inf),
+            high=np.array([np.inf, np.inf, speeds.at[-1]]),
+            contains=f"{site}/coulomb",
+            sizes=stribeck,
+            slopes=stribeck_slopes,
+            starts=stribeck_starts,
+        ),
+    }
+
+
+def _drive_laws(site: str, first: int, limits: _Nodes) -> dict[str, ForceLaw]:
+    """The laws of a drive, the columns of whose joint begin at `first`.
+
+    A gain divides the force that the motion needs. If it multiplied the commands, none at all would leave the least.
+    """
+    whole = np.eye(len(limits.at))[-1]
+    return {
+        f"{site}/offset": _proportional(first + MINUS_ONE, "F_0", -np.inf),
+        f"{site}/gain": ForceLaw(
             np.array([first + NEEDED]),
             lambda fitted: {"k": 1.0 / (1.0 + float(fitted[0]))},
             np.array([STRONGEST]),
             np.array([GAIN]),
         ),
+        f"{site}/kp": ForceLaw(
+            np.array([first + STIFFNESS]),
+            lambda fitted: {"factor": 1.0 + float(fitted[0])},
+            np.array([STRONGEST]),
+            np.array([GAIN]),
+        ),
+        f"{site}/lag": _interpolated(first + LAGGED, "tau", _Nodes(np.array(LAGS))),
+        f"{site}/dead_zone": _interpolated(first + CLIPPED, "band", limits),
+        f"{site}/saturation": _interpolated(first + CLIPPED, "F_max", limits, taken_from=whole),
     }
 
 
+def _sensor_laws(site: str, first: int) -> dict[str, ForceLaw]:
+    """The laws of a sensor, whose columns begin at `first`."""
+    return {
+        f"{site}/bias": _linear(np.array([first]), ("b",)),
+        f"{site}/scale": _linear(np.array([first + 1]), ("e",)),
+        f"{site}/delay": _linear(np.array([first + 2]), ("tau",), 0.0),
+    }
+
+
+def _linear(columns: np.ndarray, symbols: tuple[str, ...], low: float = -np.inf) -> ForceLaw:
+    """A law whose force is proportional to each of its numbers."""
+    return ForceLaw(
+        columns,
+        lambda fitted: dict(zip(symbols, fitted.tolist(), strict=True)),
+        np.full(len(columns), low),
+        np.full(len(columns), np.inf),
+    )
+
+
 def _proportional(column: int, symbol: str, low: float = 0.0) -> ForceLaw:
-    """A law of one number to which its force is proportional."""
-    none = np.array([np.inf])
-    return ForceLaw(np.array([column]), lambda fitted: {symbol: float(fitted[0])}, np.array([low]), none, symbol)
+    """A law of one number that is known beside other laws too."""
+    return replace(_linear(np.array([column]), (symbol,), low), measured=symbol)
+
+
+def _interpolated(columns: np.ndarray, symbol: str, nodes: _Nodes, taken_from: np.ndarray | None = None) -> ForceLaw:
+    """A law of one number between those at which it has a column.
+
+    Args:
+        columns: Shape (K,); of several joints that share the number, shape (joints, K).
+        symbol: Of the number.
+        nodes: Where the columns are.
+        taken_from: Sizes of the columns, from which the weights are subtracted; None where the weights are the sizes.
+    """
+    joints = columns.size // len(nodes.at)
+    sign, least = (1.0, np.zeros(len(nodes.at))) if taken_from is None else (-1.0, taken_from)
+    return ForceLaw(
+        columns.ravel(),
+        lambda fitted: {symbol: float(fitted[0])},
+        np.zeros(1),
+        np.full(1, np.inf),
+        high=nodes.at[-1:],
+        sizes=lambda fitted: np.tile(least + sign * nodes.weights(fitted[0]), joints),
+        slopes=lambda fitted: sign * np.tile(nodes.slopes(fitted[0]), joints)[:, None],
+        starts=lambda _: nodes.at[:-1, None],
+    )
 
 
 @dataclass(frozen=True)
@@ -260,19 +332,3 @@ def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: f
         own = _LinkEffect(model, link, kind)
         laws[own.name] = ForceLaw(columns, own.numbers, low, usual, sizes=own.sizes, slopes=own.slopes, starts=begins)
     return laws
-
-
-def _tilts(model: Model, tree: Tree) -> np.ndarray:
-    """Change of gravity in the frame of the base per roll and pitch, shape (3, 2)."""
-    tilt = model.effects.get("environment/base_tilt", {"roll": 0.0, "pitch": 0.0})
-    here = weight_of(model)
-    slopes = []
-    for name in ("roll", "pitch"):
-        moved = model.with_effects({"environment/base_tilt": {**tilt, name: tilt[name] + SHIFT}})
-        slopes.append((gravity(ModelBatch(moved), tree)[:, 0] - here) / SHIFT)
-    return np.stack(slopes, axis=1)
-
-
-def _tree_of(model: Model) -> Tree:
-    assert model.plant.tree is not None
-    return model.plant.tree

@@ -15,15 +15,16 @@ from scipy.optimize import least_squares
 
 from wipx.core.model import Model
 from wipx.core.recording import Recording
-from wipx.diagnosis.candidates.force_laws import ForceColumns, ForceLaw, force_laws
+from wipx.diagnosis.candidates.force_columns import ForceColumns, force_columns
+from wipx.diagnosis.candidates.force_laws import ForceLaw, force_laws
 from wipx.diagnosis.likelihood.hypothesis import ByForces
 from wipx.effects.catalogue import vocabulary
-from wipx.identify.inverse_dynamics import signals_of
-from wipx.identify.motion import independent_rows, motions
-from wipx.identify.noise import sensor_noise
+from wipx.identify.motion import independent_rows
 
 ALIKE = 1e-9  # relative, of the normal equations of columns that are nearly alike
 STARTS = 2  # from which a law is fitted
+LIGHTEST = 1e-3  # of the inertia that a joint feels
+WORTH = 0.05  # an effect must take a tenth of what is left at some joint [nats a row]
 TRIALS = 40  # evaluations of a fit at most
 
 
@@ -72,6 +73,7 @@ class Regression:
             return self._judged({}, np.zeros(self._columns.count))
         laws = [self.laws[effect] for effect in start]
         low = np.concatenate([law.low for law in laws])
+        high = np.concatenate([np.full(law.count, np.inf) if law.high is None else law.high for law in laws])
         sure = 1.0 / np.concatenate([law.usual for law in laws])
         ends = np.cumsum([law.count for law in laws])[:-1]
 
@@ -86,8 +88,8 @@ class Regression:
             of_left = [self._root[:, 1 + law.columns] @ law.slopes(own) for law, own in parts]
             return np.concatenate([np.concatenate(of_left, axis=1), np.diag(sure)])
 
-        begin = np.maximum(np.concatenate(list(start.values())), low + 1e-12)
-        best = least_squares(errors, begin, slopes, (low, np.inf), x_scale="jac", max_nfev=TRIALS).x  # pyright: ignore
+        begin = np.clip(np.concatenate(list(start.values())), low + 1e-12, high - 1e-12)
+        best = least_squares(errors, begin, slopes, (low, high), x_scale="jac", max_nfev=TRIALS).x  # pyright: ignore
         numbers = dict(zip(start, np.split(best, ends), strict=True))
         return self._judged(numbers, self._sizes(numbers))
 
@@ -147,11 +149,14 @@ class Regression:
         return Fitted(numbers, sizes, self._likelihood(sizes) - surprise, self._penalty(numbers))
 
     def _likelihood(self, sizes: np.ndarray) -> float:
-        return -0.5 * float(self._rows @ np.log(np.maximum(self._powers(sizes), 1e-300)))
+        """Of accelerations, for whose noise a force counts by the inertia that it moves."""
+        inertia = np.maximum(1.0 + self._columns.inertia @ sizes, LIGHTEST)
+        return -0.5 * float(self._rows @ np.log(np.maximum(self._powers(sizes), 1e-300) / inertia**2))
 
     def _penalty(self, effects: Iterable[str]) -> float:
         rows = {effect: float(self._rows[self._felt[effect]].sum()) for effect in effects}  # that can tell of it
-        return 0.5 * sum(self.laws[effect].count * float(np.log(rows[effect])) for effect in effects)
+        worth = {effect: WORTH * float(self._rows[self._felt[effect]].max()) for effect in effects}
+        return sum(0.5 * self.laws[e].count * float(np.log(rows[e])) + worth[e] for e in rows)
 
     def _sizes(self, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
         sizes = np.zeros(self._columns.count)
@@ -176,10 +181,10 @@ def numbers_by_forces(model: Model, recordings: Sequence[Recording]) -> dict[str
         model: A robot from a model file, as its owner believes it to be.
         recordings: Of it.
     """
-    columns = _forces(model, tuple(recordings))
+    columns, ranges = force_columns(model, tuple(recordings))
     known = vocabulary(model.plant).keys() - model.effects.keys()
     shown = np.flatnonzero(columns.sizes)
-    laws = {n: law for n, law in force_laws(model).items() if n in known and np.isin(law.columns, shown).any()}
+    laws = {n: law for n, law in force_laws(model, ranges).items() if n in known and np.isin(law.columns, shown).any()}
     regression = Regression(columns, laws)
     chosen = _selected(regression)
     found: dict[str, ByForces] = {}
@@ -201,19 +206,6 @@ def _gain_beside(regression: Regression, fit: Fitted, effect: str) -> float:
     """Gain of the drive of the joint at which an effect acts: a regression has forces as the drive is commanded."""
     drive = f"actuator_{effect.partition('/')[0]}/gain"
     return regression.laws[drive].numbers(fit.numbers[drive])["k"] if drive in fit.numbers else 1.0
-
-
-def _forces(model: Model, recordings: tuple[Recording, ...]) -> ForceColumns:
-    """Forces that the motion needs and the model does not give, and what may add to them.
-
-    Products of smoothed signals are not the smoothed products: they err by the square of the filter's width. So they
-    are extrapolated to no width from two of them (Richardson 1911).
-    """
-    noise = sensor_noise(recordings, model.plant)
-    narrow, wide = (motions(recordings, model.plant, noise, wider=width) for width in (1.0, np.sqrt(2.0)))
-    kept = [motion.kept for motion in wide]
-    columns = [ForceColumns.of(model, signals_of(model, each, kept)) for each in (narrow, wide)]
-    return columns[0].extrapolated(columns[1])
 
 
 def _selected(regression: Regression) -> Fitted:
