@@ -37,11 +37,12 @@ def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
 
 def expected_loss(fit: Fit, effect: str) -> float:
     """What a fit loses without an effect at the same noise, were its likelihood a parabola (Wald 1943) [nats]."""
-    indices = fit.hypothesis.parameters_of(effect)
-    space = fit.hypothesis.space
-    shift = (fit.hypothesis.cube - space.neutral)[indices]
-    own = np.linalg.pinv(fit.information)[np.ix_(indices, indices)]
-    return 0.5 * float(shift @ np.linalg.solve(own + 1e-15 * np.eye(len(own)), shift))
+    own = fit.hypothesis.parameters_of(effect)
+    others = np.setdiff1d(np.arange(len(fit.information)), own)
+    shift = (fit.hypothesis.cube - fit.hypothesis.space.neutral)[own]
+    across = fit.information[np.ix_(others, own)]
+    beside = np.linalg.lstsq(fit.information[np.ix_(others, others)], across)[0]  # how the others would make up for it
+    return 0.5 * float(shift @ (fit.information[np.ix_(own, own)] - across.T @ beside) @ shift)
 
 
 @dataclass(frozen=True)
