@@ -1,5 +1,6 @@
 """A robot is searched part by part: what its parts are, and what an effect is worth beside those of other parts."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,3 +32,13 @@ def test_noise_that_is_fitted_anew_takes_over_part_of_the_expected_loss(fresh_se
     loss = evidence(without, with_it)
     assert loss > 5.0
     assert loss < 1.1 * expected_loss(with_it, "translation/viscous")
+
+
+def test_an_effect_that_does_nothing_is_no_loss_whatever_its_other_numbers(fresh_seed: int):
+    """Recordings tell nothing of a place where no mass is, or of a speed without a peak."""
+    fit = bench("linear_axis", {}, fresh_seed).fit("translation/viscous", "translation/stribeck")
+    speed = fit.hypothesis.space.names.index("translation/stribeck.v_s")
+    cube, jacobian = fit.hypothesis.space.neutral.copy(), fit.jacobian.copy()
+    cube[speed], jacobian[:, speed] = 0.7, 0.0
+    nothing = replace(fit, hypothesis=fit.hypothesis.at(cube), jacobian=jacobian)
+    assert abs(expected_loss(nothing, "translation/stribeck")) < 1e-6
