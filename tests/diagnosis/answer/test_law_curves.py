@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from diagnosis.recorded import bench
 from sim.robots import Effects, move, robot, row_forces
 
-from wipx.diagnosis.answer.law_curves import added_force
+from wipx.core.curve import Curve
+from wipx.diagnosis.answer.law_curves import added_force, law_curve
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.residuals.residual_tests import shapes_of
 from wipx.effects.catalogue import kinds
 
 HEAVY = {"body_mass": 0.0, "wheel_mass": 1e6, "wheel_radius": 0.05}  # keeps its speed whatever acts on it
@@ -66,3 +70,34 @@ def test_laws_of_the_drive_are_drawn_as_they_act_on_each_other(fresh_seed: int):
         others = {other: values for other, values in effects.items() if other != name}
         acting = [force(effects, "command", a, 0.04) - force(others, "command", a, 0.04) for a in at]
         np.testing.assert_allclose(added_force(model, name, at), acting, atol=2e-3)
+
+
+def curve_of(effect: str, hidden: Effects, seed: int) -> Curve:
+    """What is drawn of the only effect that an answer has."""
+    case = bench("linear_axis", hidden, seed, count=4)
+    begin = {f"{name}.{symbol}": value for name, own in hidden.items() for symbol, value in own.items()}
+    fit = case.fitter.converged(case.fitter.fit(Hypothesis.of(case.setting, (effect,), begin), case.quiet))
+    curve = law_curve(case.fitter, fit, effect, shapes_of(case.fitter, fit))
+    assert curve is not None
+    return curve
+
+
+@pytest.mark.parametrize(
+    ("effect", "numbers"),
+    [("actuator/saturation", {"F_max": 0.6}), ("translation/viscous", {"sigma": 2.0})],
+)
+def test_data_lie_on_a_law_that_is_right(effect: str, numbers: dict[str, float], fresh_seed: int):
+    curve = curve_of(effect, {effect: numbers}, fresh_seed)
+    law = np.interp(curve.bins, curve.at, curve.law)
+    size = np.abs(curve.law).max()
+    np.testing.assert_array_less(np.abs(curve.force - law), 5.0 * curve.spread + 1e-3 * size)
+    assert np.median(curve.spread) < 0.2 * size
+
+
+def test_data_leave_a_law_of_another_shape(fresh_seed: int):
+    hidden = {"translation/coulomb": {"F_c": 0.4}, "translation/viscous": {"sigma": 1.0}}
+    curve = curve_of("translation/viscous", hidden, fresh_seed)
+    slow = np.abs(curve.bins) < 0.5 * np.abs(curve.bins).max()
+    resisting = -curve.force * np.sign(curve.bins)
+    drawn = np.interp(np.abs(curve.bins), curve.at, -curve.law)
+    assert np.mean((resisting > drawn)[slow & (curve.bins != 0.0)]) > 0.7

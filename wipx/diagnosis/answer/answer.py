@@ -160,19 +160,11 @@ def _effects_of_part(
                 context.held_out.gain(repeated, reduced),
                 probability,
                 0.0,
-                law_curve(context.by_row, _taken_out(context, fit, effect), fit, effect, shapes),
+                law_curve(*context.fitter.seen_by_row(fit), effect, shapes),
                 bool(law.tolerance),
             )
         )
     return found
-
-
-def _taken_out(context: Context, fit: Fit, effect: str) -> Fit:
-    """A fit with one effect taken out and all other numbers kept: what it lacks is that effect, nothing else."""
-    rest = tuple(e for e in fit.effects if e != effect)
-    hypothesis = Hypothesis.of(context.setting.with_curve_of(fit.hypothesis), rest, fit.hypothesis.values)
-    found = context.by_row.fit(hypothesis, context.fitter.seen_by_row(fit)[1].levels, steps=0)
-    return replace(found, jacobian=found.jacobian[:, :0])
 
 
 def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:

@@ -6,16 +6,20 @@ from wipx.core.curve import Curve
 from wipx.core.effect import Steady
 from wipx.core.model import Model
 from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.force_response import response
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
-from wipx.diagnosis.residuals.discrepancy import process_mean
-from wipx.diagnosis.residuals.residual_tests import Shape, residual_tests
+from wipx.diagnosis.residuals.residual_tests import Shape
 from wipx.effects.catalogue import effect_of, kind_of
 
 POINTS = 201
 
 
-def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
-    """The law of an effect beside the force that the model without it lacks; None where no curve shows it."""
+def law_curve(fitter: InnovationFitter, completed: Fit, effect: str, shapes: list[Shape]) -> Curve | None:
+    """The law of an effect beside the force that the recordings need in its place; None where no curve shows it.
+
+    That force is the law and what the completed model leaves over of the same signal (partial residuals: Larsen,
+    McCleary 1972, Technometrics 14(3)).
+    """
     plant = fitter.data.plant
     steady = effect_of(effect, plant).steady
     site = effect.partition("/")[0]
@@ -28,8 +32,9 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
     if shape is None:
         return None
     at = _abscissa(shape.knots[0], shape.knots[-1])
-    left = residual_tests(fitter, reduced, [shape])[0]
-    force, spread = process_mean(left.slopes, reduced.white.ravel(), shape.knots)
+    law = added_force(completed.hypothesis.model, effect, at)
+    slopes = response(fitter, completed, joint, shape.columns)
+    left, spread = _left_over(slopes, completed.white.ravel(), float(np.abs(law).max()))
     quantity, unit = ("torque", "N m") if plant.is_angular(plant.joints[joint]) else ("force", "N")
     return Curve(
         quantity,
@@ -37,11 +42,24 @@ def law_curve(fitter: InnovationFitter, reduced: Fit, completed: Fit, effect: st
         plant.unit_of(shape.signal),
         unit,
         at,
-        added_force(completed.hypothesis.model, effect, at),
+        law,
         shape.knots,
-        force,
+        added_force(completed.hypothesis.model, effect, shape.knots) + left,
         spread,
     )
+
+
+def _left_over(slopes: np.ndarray, white: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Force that a fit leaves over at the knots and its standard deviation, shape (KNOTS,) each.
+
+    Args:
+        slopes: Of the white innovations by the force at each knot, shape (N, KNOTS).
+        white: White innovations, shape (N,).
+        size: Of the force, where the innovations do not tell; its standard deviation beforehand.
+    """
+    scaled = slopes * max(size, 1e-300)
+    covariance = np.linalg.inv(scaled.T @ scaled + np.eye(slopes.shape[1]))
+    return -size * covariance @ (scaled.T @ white), size * np.sqrt(np.diag(covariance))
 
 
 def _signal(steady: Steady, joint: int, fitter: InnovationFitter) -> str:
