@@ -37,7 +37,7 @@ def parts_of(plant: Plant) -> tuple[frozenset[str], ...]:
 
 def expected_loss(fit: Fit, effect: str) -> float:
     """What a fit loses without an effect at the same noise, were its likelihood a parabola (Wald 1943) [nats]."""
-    own = fit.hypothesis.parameters_of(effect)
+    own = np.array(fit.hypothesis.parameters_of(effect))
     others = np.setdiff1d(np.arange(len(fit.information)), own)
     shift = (fit.hypothesis.cube - fit.hypothesis.space.neutral)[own]
     across = fit.information[np.ix_(others, own)]
