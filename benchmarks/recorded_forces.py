@@ -4,8 +4,8 @@
 `python benchmarks/recorded_forces.py FOLDER` prints what is asked for of each and the sums.
 """
 
+import argparse
 import json
-import sys
 import time
 from pathlib import Path
 
@@ -14,11 +14,11 @@ from wipx.diagnosis.pipeline import in_two
 from wipx.recordings.source import RecordingSource
 
 
-def main(folder: Path) -> None:
-    """Ask for every robot of a folder."""
+def main(cases: list[Path]) -> None:
+    """Ask for every robot, each in a folder of its own."""
     hits = missed = others = 0
     seconds = []
-    for case in sorted(path.parent for path in folder.glob("*/answer.json")):
+    for case in cases:
         hidden = {effect["name"] for effect in json.loads((case / "answer.json").read_text())["effects"]}
         source = RecordingSource(str(case / "visible"))
         model, recordings = source.describe().model, source.load()
@@ -31,11 +31,15 @@ def main(folder: Path) -> None:
         print(f"  hidden and asked for: {', '.join(sorted(asked & hidden)) or '-'}")
         print(f"  hidden only: {', '.join(sorted(hidden - asked)) or '-'}")
         print(f"  asked for only: {', '.join(sorted(asked - hidden)) or '-'}", flush=True)
-    if not seconds:
-        sys.exit(f"{folder}: no folder with answer.json; draw robots with task=blind_practice")
     print(f"of {hits + missed} hidden effects {hits} are asked for, and {others} that are not hidden")
     print(f"{sorted(seconds)[len(seconds) // 2]:.1f} s in the median, {max(seconds):.1f} s at most")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="of task=blind_practice")
+    folder = parser.parse_args().folder
+    drawn = sorted(path.parent for path in folder.glob("*/answer.json"))
+    if not drawn:
+        parser.error(f"{folder} has no folder with an answer.json; draw robots with task=blind_practice")
+    main(drawn)

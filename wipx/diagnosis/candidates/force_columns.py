@@ -29,7 +29,7 @@ from wipx.identify.motion import Motion, motions
 from wipx.identify.noise import sensor_noise
 from wipx.sim.tree.inertias import gravity
 
-SHIFT = 1e-4  # [rad, m, s], or a share, over which slopes are taken
+SHIFT = 1e-4  # over which slopes are taken, in SI units or as a share
 DELAYS = (0.005, 0.012, 0.025, 0.05)  # [s]
 LAGS = (0.005, 0.015, 0.04, 0.1)  # [s]
 LIMITS = (0.03, 0.08, 0.16, 0.3, 0.5, 0.75, 1.0)  # of the largest force that was commanded

@@ -31,6 +31,7 @@ from wipx.diagnosis.candidates.force_columns import (
     OWN,
     RATE,
     SENSOR,
+    SHIFT,
     STIFFNESS,
     Ranges,
     tree_of,
@@ -40,7 +41,6 @@ from wipx.effects.catalogue import effect_of
 from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import inertial_numbers
 
-SHIFT = 1e-4  # [kg, m], over which slopes are taken
 GAIN = 0.2  # usual error of a drive's gain or stiffness
 STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
