@@ -202,17 +202,16 @@ class InnovationFitter(Fitter):
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
         Groups of channels are searched side by side: what a level does to the likelihood of another group is left
-        aside in a step, but the step must make all of them likelier together. A common factor of a group's levels does
-        not matter: the first sensor's is kept.
+        aside in a step, but the step must make all of them likelier together. Where none does, the levels are changed
+        one by one. A common factor of a group's levels does not matter: the first sensor's is kept.
 
         Args:
             fit: Where to start.
         """
         levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
-        centre = before = best = _logarithms(levels)
+        centre = best = _logarithms(levels)
         free = self._free_levels
-        known = np.full(len(free), -np.inf)
         for step in LEVEL_STEPS:
             move = np.zeros_like(best)
             for _ in range(12):
@@ -221,15 +220,14 @@ class InnovationFitter(Fitter):
                     moves.append(move)
                 trials = [np.clip(best + each, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for each in moves]
                 likelihoods = search.likelihoods([best, *trials])
-                if likelihoods[0].sum() < known.sum():
-                    best = before
-                    break
                 gains = likelihoods[1:] - likelihoods[0]
                 move = _joined(gains, moves, free)
-                if gains.max(axis=0).sum() <= LEVEL_GAIN:
+                there = search.likelier([_best_of_each(gains, trials, best, free)], best)
+                if there is None and len(free) > 1 and step == max(LEVEL_STEPS):
+                    there = search.changed_alone(best, np.concatenate(free), step, centre)
+                if there is None:
                     break
-                before, known = best, likelihoods[0]
-                best = _best_of_each(gains, trials, best, free)
+                best = there
         return _levels(best, levels)
 
     @cached_property
@@ -320,6 +318,23 @@ class _LevelSearch:
             levels = [_levels(point, self.levels) for point in fresh.values()]
             self.known.update(zip(fresh, self.fitter.likelihoods(self.hypothesis, levels), strict=True))
         return np.array([self.known[_key(point)] for point in points])
+
+    def likelier(self, points: Sequence[np.ndarray], base: np.ndarray) -> np.ndarray | None:
+        """The likeliest of points, if it is so by more than `LEVEL_GAIN` than a base."""
+        totals = self.likelihoods([base, *points]).sum(axis=1)
+        i = int(totals[1:].argmax())
+        return points[i] if totals[1 + i] > totals[0] + LEVEL_GAIN else None
+
+    def changed_alone(self, base: np.ndarray, free: np.ndarray, step: float, centre: np.ndarray) -> np.ndarray | None:
+        """A base with the levels changed that gain alone: all of them or the best; None where none does."""
+        points = np.repeat(base[None], 2 * len(free), axis=0)
+        points[np.arange(len(points)), np.repeat(free, 2)] += np.tile([-step, step], len(free))
+        points = np.clip(points, centre - LEVEL_RANGE, centre + LEVEL_RANGE)
+        totals = self.likelihoods([base, *points]).sum(axis=1)
+        gains = (totals[1:] - totals[0]).reshape(-1, 2)  # of each level, down and up
+        moves = (points - base).reshape(len(free), 2, -1)[np.arange(len(free)), gains.argmax(axis=1)]
+        most = gains.max(axis=1)
+        return self.likelier([base + moves[most > 0.0].sum(axis=0), base + moves[most.argmax()]], base)
 
 
 def _key(point: np.ndarray) -> tuple[float, ...]:
