@@ -202,8 +202,8 @@ class InnovationFitter(Fitter):
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
         Groups of channels are searched side by side: what a level does to the likelihood of another group is left
-        aside in a step, but the step must make all of them likelier together. Where none does, the levels are changed
-        one by one. A common factor of a group's levels does not matter: the first sensor's is kept.
+        aside in a step, but the step must make all of them likelier together. Where none of the longest steps does, the
+        levels are changed one by one. A common factor of a group's levels does not matter: the first sensor's is kept.
 
         Args:
             fit: Where to start.
