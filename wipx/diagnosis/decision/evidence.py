@@ -68,11 +68,11 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
     """
     if context.by_forecasts_alone:
         chosen = Chosen(search.nominal)
-        ahead = _by_forecasts_and_forces(context, chosen.fit, watcher)
+        ahead = _by_forecasts_and_forces(context, chosen.fit, watcher, afresh=True)
         return ahead or _by_innovations(context, search, chosen, watcher)
     begun = search.grown(steps=1)
     if not context.holds_somewhere(begun.fit):
-        ahead = _by_forecasts_and_forces(context, begun.fit, watcher)
+        ahead = _by_forecasts_and_forces(context, begun.fit, watcher, afresh=True)
         if ahead is not None and not context.holds_somewhere(search.fit_from(ahead.rest.fit)):
             return ahead
     chosen = search.run(begun.fit).after(begun.considered)
@@ -93,7 +93,7 @@ def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: W
     return _better(by_row, fitter, *_by_forecasts(context, fitter, chosen.fit))
 
 
-def _by_forecasts_and_forces(context: Context, chosen: Fit, watcher: Watcher) -> Found | None:
+def _by_forecasts_and_forces(context: Context, chosen: Fit, watcher: Watcher, *, afresh: bool = False) -> Found | None:
     """What forecasts find on an arm; None where recordings are too short for them.
 
     Laws of an arm hold nearly at best. Where forces and motion do not quite agree, forecasts prefer joints that are too
@@ -104,7 +104,7 @@ def _by_forecasts_and_forces(context: Context, chosen: Fit, watcher: Watcher) ->
     if not fitter.is_possible:
         return None
     watcher("predictions of half a second", 0.5)
-    return _by_forecasts(context, fitter, chosen)[0]
+    return _by_forecasts(context, fitter, chosen, afresh=afresh)[0]
 
 
 def _better(by_row: Found, fitter: ForecastFitter, ahead: Found, agrees: bool) -> Found:
@@ -139,21 +139,23 @@ def _is_far_likelier(fitter: ForecastFitter, rest: Rest, other: Fit) -> bool:
     return fitter.separation(seen, other, lead, 1.0) > fitter.rules.answer.told_apart
 
 
-def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit) -> tuple[Found, bool]:
+def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit, *, afresh: bool = False) -> tuple[Found, bool]:
     """What forecasts find to be missing, and whether that is hardly better than all of what innovations chose.
 
-    A second search starts from what innovations chose; the better end counts.
+    A robot of many joints is searched once, from what innovations chose on; afresh where they were not searched to the
+    end. On another robot a second search starts there; the better end counts.
     """
     setting, least_gain = context.setting, context.rules.selection.least_gain
     ahead = replace(context, fitter=fitter)
     nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
     search = search_of(FitStore.of(fitter, setting, nominal), nominal)
     criteria = search.criteria
-    best = search.run()
-    if setting.nominal.plant.tree is not None:
+    if isinstance(search, RobotSearch):
+        best = search.run(search.fit_from(chosen) if chosen.effects and not afresh else None)
         ahead = ahead.trusting(best.fit)
         same_names = set(best.fit.effects) == set(chosen.effects)
         return _with_minor_effects(Found(ahead, search, *_left_over(ahead, search.nominal, best))), same_names
+    best = search.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
     same = nominal
     if chosen.effects:

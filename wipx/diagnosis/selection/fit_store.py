@@ -130,15 +130,26 @@ class FitStore:
     def restarted(self, fit: Fit) -> Fit:
         """A fit, or a better one of the same effects that another search leads to.
 
-        Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother. Where the
-        likelihood of an effect has many peaks, the highest may be another one beside further effects.
+        Where the likelihood of an effect has many peaks, the highest may be another one beside further effects.
         """
-        found = [self.fitter.converged(self.fitter.fit(fit.hypothesis, self.fitter.escape_levels(fit)))]
-        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
-        if moved is not fit:
-            found.append(self.fitter.converged(moved))
+        found = self._escaped(fit)
         if len(fit.effects) > 1:
             found += [self._restarted_without(fit, effect) for effect in fit.effects if kind_of(effect).scan]
+        return self._best_of(fit, found)
+
+    def escaped(self, fit: Fit) -> Fit:
+        """The same from near the fit only, as long as it gets better."""
+        better = self._best_of(fit, self._escaped(fit))
+        return fit if better is fit else self.escaped(better)
+
+    def _escaped(self, fit: Fit) -> list[Fit]:
+        """Fits from near one: forces that explain a misfit make it hard to leave, louder ones smooth the likelihood."""
+        found = [self.fitter.converged(self.fitter.fit(fit.hypothesis, self.fitter.escape_levels(fit)))]
+        moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
+        return found if moved is fit else [*found, self.fitter.converged(moved)]
+
+    def _best_of(self, fit: Fit, found: list[Fit]) -> Fit:
+        """The best of some fits, if it is better than one of the same effects."""
         again = max(found, key=lambda each: each.log_likelihood)
         return fit if again.log_likelihood < fit.log_likelihood + 1.0 else self.keep(again)
 

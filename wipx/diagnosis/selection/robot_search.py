@@ -129,14 +129,19 @@ class RobotSearch(Search):
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
         fitter, grown = self.store.fitter, self.grown(begin, self.store.fitter.rounds)
-        whole = self.pruned(grown.fit).after(grown.considered)
+        whole = self._finished(grown)
         for _ in range(fitter.exchanges):
             other = self._changed(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
             if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= 0.0:
                 return Chosen(whole.fit, whole.considered + other.considered)
             grown = self.grown(other.fit, fitter.rounds)
-            whole = self.pruned(grown.fit).after(whole.considered + other.considered + grown.considered)
+            whole = self._finished(grown).after(whole.considered + other.considered)
         return whole
+
+    def _finished(self, grown: Chosen) -> Chosen:
+        """A search's end without what is superfluous; its numbers, found part by part, are looked for once more."""
+        pruned = self.pruned(grown.fit).after(grown.considered)
+        return Chosen(self.store.escaped(pruned.fit), pruned.considered)
 
     def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
         """The fit with further effects of all parts in turn, as often as `steps` says or as any gains enough."""
