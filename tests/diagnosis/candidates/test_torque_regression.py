@@ -109,6 +109,14 @@ def test_a_weak_drive_is_told_from_friction(tmp_path: Path, fresh_seed: int):
     assert found.get("elbow/coulomb.F_c", 0.0) < 0.005
 
 
+def test_gears_that_rub_more_under_force(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    hidden = {"shoulder/load_friction": {"K_motor": 0.2, "K_external": 0.1}, "elbow/viscous": {"sigma": 0.02}}
+    found = asked_for(model, (recorded(model.with_effects(hidden), fresh_seed),))
+    assert found["shoulder/load_friction.K_motor"] == pytest.approx(0.2, abs=0.05)
+    assert found["shoulder/load_friction.K_external"] == pytest.approx(0.1, abs=0.04)
+
+
 def test_late_commands_and_late_drives_are_told_apart(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     hidden = {"actuator_shoulder/delay": {"tau": 0.017}, "actuator_elbow/lag": {"tau": 0.03}}
@@ -215,12 +223,25 @@ def test_of_a_joint_at_rest_forces_say_nothing_of_its_motion(tmp_path: Path, fre
     assert np.isfinite(found["shoulder/viscous.sigma"].deviation)
 
 
-def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_beside_the_counterbalance():
-    folder = ARMS / "kuka_kr300" / "visible"
+def real_arm(name: str) -> RecordingSource:
+    """The recordings of an arm that its diagnosis may see."""
+    folder = ARMS / name / "visible"
     if not folder.is_dir():
         pytest.skip(f"{folder} is missing: recordings of real arms; WIPX_ARMS names their folder")
-    source = RecordingSource(path=str(folder))
+    return RecordingSource(path=str(folder))
+
+
+def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_beside_the_counterbalance():
+    source = real_arm("kuka_kr300")
     found = asked_for(source.describe().model, source.load())
     assert found["A2/coulomb.F_c"] == pytest.approx(490.0, rel=0.2)  # Weigand et al. 2021
     assert found["A2/rotor_inertia.J"] == pytest.approx(844.0, rel=0.2)
     assert found["A2/spring.k"] > 3000.0
+
+
+def test_friction_that_takes_nearly_all_force_of_a_real_wrist_is_no_share_of_that_force():
+    source = real_arm("staubli_tx40")
+    found = asked_for(source.describe().model, source.load())
+    assert found["joint_4/coulomb.F_c"] == pytest.approx(2.48, rel=0.2)  # as the authors have it
+    assert found["joint_4/viscous.sigma"] == pytest.approx(1.11, rel=0.2)
+    assert "joint_4/load_friction.K_motor" not in found

@@ -33,13 +33,14 @@ SHIFT = 1e-4  # over which slopes are taken, in SI units or as a share
 DELAYS = (0.005, 0.012, 0.025, 0.05)  # [s]
 LAGS = (0.005, 0.015, 0.04, 0.1)  # [s]
 LIMITS = (0.03, 0.08, 0.16, 0.3, 0.5, 0.75, 1.0)  # of the largest force that was commanded
+LOAD_SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the load, beside the motor, in the force that rubs
 STRIBECK_SPEEDS = (0.05, 0.15, 0.5)  # of the joint's root mean square speed
 POSTURES = 30  # of which the mean inertia is taken
-PROPORTIONAL = 10  # columns of a joint that are not interpolated
 
-DIRECTION, RATE, ACCELERATION, COORDINATE, MINUS_ONE, NEEDED, DRAG, MOTOR, LOAD, STIFFNESS = range(PROPORTIONAL)
-_ENDS = np.cumsum([PROPORTIONAL, len(DELAYS), len(LAGS), len(LIMITS), len(STRIBECK_SPEEDS)]).tolist()
-DELAYED, LAGGED, CLIPPED, BUMPS = (np.arange(first, end) for first, end in pairwise(_ENDS))
+DIRECTION, RATE, ACCELERATION, COORDINATE, MINUS_ONE, NEEDED, DRAG = range(7)
+_GROUPS = (DRAG + 1, len(LOAD_SHARES), 1, len(DELAYS), len(LAGS), len(LIMITS), len(STRIBECK_SPEEDS))
+_ENDS = np.cumsum(_GROUPS).tolist()
+RUBBED, STIFFNESS, DELAYED, LAGGED, CLIPPED, BUMPS = (np.arange(first, end) for first, end in pairwise(_ENDS))
 OWN = _ENDS[-1]  # columns of a joint
 SENSOR = 3  # columns of a sensor: bias, scale, delay
 
@@ -173,7 +174,7 @@ def _inertia(model: Model, signals: Signals, shared: int) -> np.ndarray:
 
 
 def _of_motion(model: Model, signals: Signals, lacking: np.ndarray) -> np.ndarray:
-    """The columns of a joint up to its load, shape (rows, joints, LOAD + 1)."""
+    """The columns of a joint up to what rubs, shape (rows, joints, STIFFNESS)."""
     still = replace(signals, accelerations=np.zeros_like(signals.accelerations))
     load = inverse_dynamics(tree_of(model), still, numbers(model), weight_of(model))
     own = {
@@ -184,14 +185,13 @@ def _of_motion(model: Model, signals: Signals, lacking: np.ndarray) -> np.ndarra
         MINUS_ONE: -np.ones_like(signals.rates),
         NEEDED: lacking + signals.forces,
         DRAG: signals.rates * np.abs(signals.rates),
-        MOTOR: np.abs(signals.forces) * signals.slides,
-        LOAD: np.abs(load) * signals.slides,
     }
-    return np.stack([own[column] for column in sorted(own)], axis=2)
+    rubbed = [np.abs((1.0 - share) * signals.forces + share * load) * signals.slides for share in LOAD_SHARES]
+    return np.stack([*(own[column] for column in sorted(own)), *rubbed], axis=2)
 
 
 def _of_drives(model: Model, motion: Motion, kept: slice, ranges: Ranges) -> np.ndarray:
-    """The columns of a joint from the stiffness of its drive on, shape (rows, joints, OWN - STIFFNESS)."""
+    """The columns of a joint from the stiffness of its drive on, shape (rows, joints, OWN - the others)."""
     forces = commanded_forces(model, motion)
     direction = np.clip(motion.rates / motion.rest_speeds, -1.0, 1.0)
     own = [

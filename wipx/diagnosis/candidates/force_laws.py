@@ -24,12 +24,12 @@ from wipx.diagnosis.candidates.force_columns import (
     DRAG,
     LAGGED,
     LAGS,
-    LOAD,
+    LOAD_SHARES,
     MINUS_ONE,
-    MOTOR,
     NEEDED,
     OWN,
     RATE,
+    RUBBED,
     SENSOR,
     SHIFT,
     STIFFNESS,
@@ -42,6 +42,7 @@ from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import inertial_numbers
 
 GAIN = 0.2  # usual error of a drive's gain or stiffness
+LOST = 0.2  # usual share of a force that gears lose to friction; those of servos lose up to 0.4 (Duclusaud 2025)
 STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
 
@@ -162,7 +163,7 @@ def _joint_laws(site: str, first: int, speeds: _Nodes) -> dict[str, ForceLaw]:
         f"{site}/viscous": _proportional(first + RATE, "sigma"),
         f"{site}/rotor_inertia": _proportional(first + ACCELERATION, "J"),
         f"{site}/quadratic_drag": _proportional(first + DRAG, "c"),
-        f"{site}/load_friction": _linear(first + np.array([MOTOR, LOAD]), ("K_motor", "K_external"), 0.0),
+        f"{site}/load_friction": _load_friction_law(first),
         f"{site}/spring": ForceLaw(
             np.array([first + COORDINATE, first + MINUS_ONE]),
             lambda fitted: {"k": float(fitted[0]), "q0": float(fitted[1] / max(fitted[0], 1e-300))},
@@ -185,6 +186,41 @@ def _joint_laws(site: str, first: int, speeds: _Nodes) -> dict[str, ForceLaw]:
     }
 
 
+def _load_friction_law(first: int) -> ForceLaw:
+    """Friction that grows with the motor's force and with the load, on the joint whose columns begin at `first`.
+
+    Its columns hold the friction where the load's number is some share of the sum of both.
+    """
+    shares = _Nodes(np.array(LOAD_SHARES[1:]))
+
+    def share(fitted: np.ndarray) -> float:
+        return float(fitted[1] / max(fitted.sum(), 1e-300))
+
+    def weights(fitted: np.ndarray) -> np.ndarray:
+        own = shares.weights(share(fitted))
+        return np.array([1.0 - own.sum(), *own])
+
+    def slopes(fitted: np.ndarray) -> np.ndarray:
+        own = shares.slopes(share(fitted))
+        by_share = np.array([-own.sum(), *own])
+        at = weights(fitted)
+        return np.stack([at - share(fitted) * by_share, at + (1.0 - share(fitted)) * by_share], axis=1)
+
+    def starts(sizes: np.ndarray) -> np.ndarray:
+        both = np.clip(sizes.sum(), 0.0, LOST)
+        return both * np.stack([1.0 - np.array(LOAD_SHARES), LOAD_SHARES], axis=1)
+
+    return ForceLaw(
+        first + RUBBED,
+        lambda fitted: dict(zip(("K_motor", "K_external"), fitted.tolist(), strict=True)),
+        np.zeros(2),
+        np.full(2, LOST),
+        sizes=lambda fitted: fitted.sum() * weights(fitted),
+        slopes=slopes,
+        starts=starts,
+    )
+
+
 def _drive_laws(site: str, first: int, limits: _Nodes) -> dict[str, ForceLaw]:
     """The laws of a drive, the columns of whose joint begin at `first`.
 
@@ -200,7 +236,7 @@ def _drive_laws(site: str, first: int, limits: _Nodes) -> dict[str, ForceLaw]:
             np.array([GAIN]),
         ),
         f"{site}/kp": ForceLaw(
-            np.array([first + STIFFNESS]),
+            first + STIFFNESS,
             lambda fitted: {"factor": 1.0 + float(fitted[0])},
             np.array([STRONGEST]),
             np.array([GAIN]),
