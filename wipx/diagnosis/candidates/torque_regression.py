@@ -219,9 +219,8 @@ def _selected(regression: Regression) -> Fitted:
 
 
 def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
-    """The best fit with one effect more; the same where none is worth it."""
-    contained = {regression.laws[name].contains for name in chosen.numbers}
-    more = [name for name in regression.laws if name not in chosen.numbers and name not in contained]
+    """The best fit with one effect more, or a simpler law in the place of one; the same where none is worth it."""
+    more = [name for name in regression.laws if name not in chosen.numbers]
     most = {name: regression.most_with(chosen, name) for name in more}
     best = chosen
     for name in sorted(more, key=lambda name: -most[name]):
