@@ -4,21 +4,20 @@ Both are in the vocabulary, so that recordings which show the one show the other
 say so. Which laws are two (`Effect.with_constant`, `Effect.constant_force`) the effects say themselves.
 """
 
-from collections.abc import Iterator, Mapping
-
 from wipx.core.diagnosis import Combined
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.selection.nested_laws import laws_with_constants
 from wipx.diagnosis.selection.search import Search
-from wipx.effects.catalogue import kind_of, kinds
+from wipx.effects.catalogue import kind_of
 
 
 def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]:
     """Laws that explain an effect of a fit and a constant force as well as these two."""
     found = []
     values = fit.hypothesis.values
-    for effect, name, symbols in _laws_with_constants(fit):
+    for effect, name, symbols in laws_with_constants(fit):
         for constant in (other for other in fit.effects if kind_of(other).constant_force):
             rest = tuple(other for other in fit.effects if other not in (effect, constant))
             start = {**values, **{f"{name}.{own}": values[f"{effect}.{other}"] for own, other in symbols.items()}}
@@ -29,12 +28,3 @@ def combined(context: Context, search: Search, fit: Fit) -> tuple[Combined, ...]
                 parameters = {symbol: other.hypothesis.values[f"{name}.{symbol}"] for symbol in symbols}
                 found.append(Combined(name, (effect, constant), lead, parameters))
     return tuple(found)
-
-
-def _laws_with_constants(fit: Fit) -> Iterator[tuple[str, str, Mapping[str, str]]]:
-    """Effects of a fit, the law that each is together with a constant force, and its symbols by those of that law."""
-    for effect in fit.effects:
-        site, _, kind = effect.partition("/")
-        for law in kinds().values():
-            if law.with_constant is not None and law.with_constant.kind == kind:
-                yield effect, f"{site}/{law.kind}", law.with_constant.symbols

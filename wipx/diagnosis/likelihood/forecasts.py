@@ -107,9 +107,13 @@ class ForecastFitter(Fitter):
         return self.rules.forecasts
 
     def looks_for(self, name: str, effect: Effect) -> bool:
-        """Those of contract section 3, and those of section 6 whose numbers are none of section 3."""
+        """Those of contract section 3, and those of section 6 whose numbers are none of section 3.
+
+        Where no law holds exactly, a usual law beside a constant force is likelier than one law in the place of both.
+        """
         site, machines = name.partition("/")[0], effect.on_machines
-        return not effect.is_outside(self.data.plant) or bool(machines and machines(site, self.data.plant))
+        known = not effect.is_outside(self.data.plant) or bool(machines and machines(site, self.data.plant))
+        return known and effect.with_constant is None
 
     @property
     def data(self) -> RecordingBatch:

@@ -3,7 +3,7 @@
 Which law contains which, and when it amounts to it, the effects say themselves (`wipx.core.effect.Effect`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,6 +127,15 @@ def effects_in_parts(fit: Fit, data: RecordingBatch) -> tuple[str, ...] | None:
     return None
 
 
+def laws_with_constants(fit: Fit) -> Iterator[tuple[str, str, Mapping[str, str]]]:
+    """Effects of a fit, the law that each is together with a constant force, and its symbols by those of that law."""
+    for effect in fit.effects:
+        site, _, kind = effect.partition("/")
+        for law in kinds().values():
+            if law.with_constant is not None and law.with_constant.kind == kind:
+                yield effect, f"{site}/{law.kind}", law.with_constant.symbols
+
+
 def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[str, float]]] | None:
     """The effects of a fit with a law from beyond the vocabulary, the last, in the place of one that it contains.
 
@@ -145,7 +154,7 @@ def extended_effects(fit: Fit, effect: str) -> tuple[tuple[str, ...], list[dict[
 
 
 def reduced_values(fit: Fit) -> dict[str, float]:
-    """Numbers of the fit's rich laws as those of the simple ones that they contain."""
+    """Numbers of the fit's laws as those of the laws that may take their place, so far as they share them."""
     found = {}
     for name, value in fit.hypothesis.values.items():
         effect, _, symbol = name.rpartition(".")
@@ -155,6 +164,8 @@ def reduced_values(fit: Fit) -> dict[str, float]:
     for effect in fit.effects:
         for number, symbol in _numbers_of_parts(effect).items():
             found[number] = fit.hypothesis.values[f"{effect}.{symbol}"]
+    for effect, law, symbols in laws_with_constants(fit):
+        found |= {f"{law}.{own}": fit.hypothesis.values[f"{effect}.{other}"] for own, other in symbols.items()}
     return found
 
 

@@ -132,7 +132,9 @@ class RobotSearch(Search):
         whole = self._finished(grown)
         for _ in range(fitter.exchanges):
             other = self._changed(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
-            if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= 0.0:
+            fewer = len(other.fit.effects) < len(whole.fit.effects)
+            least = -self.rules.least_gain if fewer else 0.0
+            if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= least:
                 return Chosen(whole.fit, whole.considered + other.considered)
             grown = self.grown(other.fit, fitter.rounds)
             whole = self._finished(grown).after(whole.considered + other.considered)

@@ -5,7 +5,7 @@ is explained already, so that what a law misses is not filled up with further ef
 and what it considered; fits are kept in a `FitStore`, and `Criteria` decide between them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -15,7 +15,8 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.rules import SelectionRules
 from wipx.diagnosis.selection.criteria import Criteria, evidence, score
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.nested_laws import effects_in_parts, reduced_effects
+from wipx.diagnosis.selection.nested_laws import effects_in_parts, laws_with_constants, reduced_effects
+from wipx.effects.catalogue import effect_of, kind_of
 
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
 PAIRED = 2  # effects that were not worth it alone, for which a second is sought
@@ -234,6 +235,9 @@ class Search:
 
     def _with_fewer(self, fit: Fit) -> Chosen:
         """A fit in which one effect does the work of two that is hardly worse; the fit itself where there is none."""
+        for found in self._in_one_law(fit):
+            if self.criteria.score_lead(fit, found) < self.rules.least_lead:
+                return Chosen(found)
         for effect in fit.effects if len(fit.effects) > 1 else ():
             for found in self.store.replacements(fit, effect):
                 if (
@@ -246,6 +250,15 @@ class Search:
                 if less and self.criteria.score_lead(fit, fewer.fit) < self.rules.least_gain:
                     return fewer
         return Chosen(fit)
+
+    def _in_one_law(self, fit: Fit) -> Iterator[Fit]:
+        """Fits in which one law has the place of a law and a constant force, where that law may be named."""
+        fitter, plant = self.store.fitter, self.store.setting.nominal.plant
+        for effect, law, _ in laws_with_constants(fit):
+            for constant in (other for other in fit.effects if kind_of(other).constant_force):
+                if fitter.looks_for(law, effect_of(law, plant)):
+                    rest = tuple(other for other in fit.effects if other not in (effect, constant))
+                    yield self.store.escaped(self.store.fitted((*rest, law), fit))
 
 
 def _step(current: Fit, extended: list[Fit], chosen: Fit | None, fleeting: set[frozenset[str]]) -> History:
