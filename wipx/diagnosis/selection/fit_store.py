@@ -127,14 +127,18 @@ class FitStore:
         moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         return fit if moved is fit else self.keep(self.fitter.converged(moved))
 
-    def restarted(self, fit: Fit) -> Fit:
+    def restarted(self, fit: Fit, latest: str = "") -> Fit:
         """A fit, or a better one of the same effects that another search leads to.
 
         Where the likelihood of an effect has many peaks, the highest may be another one beside further effects.
+
+        Args:
+            fit: Of all effects.
+            latest: Effect that has just been looked for beside all others; empty for none.
         """
         found = self._escaped(fit)
-        if len(fit.effects) > 1:
-            found += [self._restarted_without(fit, effect) for effect in fit.effects if kind_of(effect).scan]
+        again = [e for e in fit.effects if kind_of(e).scan and e != latest] if len(fit.effects) > 1 else []
+        found += [self._restarted_without(fit, effect) for effect in again]
         return self._best_of(fit, found)
 
     def escaped(self, fit: Fit) -> Fit:

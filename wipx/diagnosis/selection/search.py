@@ -118,10 +118,10 @@ class Search:
                     break
                 gain = evidence(current, best)
                 considered += (ConsideredEffect(_added(current, best), gain, True, "explain most together"),)
-                pruned = self.pruned(self.store.restarted(best)).after(considered)
+                pruned = self.pruned(self.store.restarted(best, best.effects[-1])).after(considered)
                 current, considered = pruned.fit, pruned.considered
                 continue
-            pruned = self.pruned(self.store.restarted(best))
+            pruned = self.pruned(self.store.restarted(best, best.effects[-1]))
             if (
                 len(pruned.fit.effects) == len(current.effects)
                 and self.criteria.lead(pruned.fit, current) < self.rules.least_lead
@@ -192,7 +192,7 @@ class Search:
                 best, considered = fewer.fit, considered + fewer.considered
             if best is fit:
                 break
-            pruned = self.pruned(self.store.restarted(self.store.keep(best)))
+            pruned = self.pruned(self.store.restarted(self.store.keep(best), best.effects[-1]))
             fit, considered = pruned.fit, considered + pruned.considered
         return Chosen(fit, considered)
 
