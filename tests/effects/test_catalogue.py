@@ -39,12 +39,11 @@ CONTRACT = (
     ("bias", ("sensor_theta",), {"b"}),
     ("scale", ("sensor_x", "sensor_theta"), {"e"}),
 )
-# Contract section 6: kinds by site, of a robot from a model file whose second drive is a position drive. Not there yet:
-# elasticity of a drive.
+# Contract section 6: kinds by site, of a robot from a model file whose second drive is a position drive.
 FRICTION = "viscous coulomb stribeck presliding asymmetric_coulomb quadratic_drag load_friction sticky_spot"
 CONTRACT_OF_TREES = {
     "j0": f"{FRICTION} rotor_inertia spring",
-    "actuator_j0": "gain offset dead_zone delay lag saturation speed_limit ripple backlash",
+    "actuator_j0": "gain offset dead_zone delay lag saturation speed_limit ripple backlash elasticity",
     "actuator_j1": "kp kd",
     "actuator": "delay",
     "sensor_j0": "bias scale delay",
@@ -182,7 +181,7 @@ def test_an_unknown_effect_lists_the_valid_ones():
     ],
 )
 def test_two_names_for_one_friction_at_a_joint_are_refused(names: tuple[str, ...]):
-    with pytest.raises(InputError, match="describe the same friction; keep one of them"):
+    with pytest.raises(InputError, match="describe the same physics; keep one of them"):
         check_together(names, plant_of("wip"))
 
 

@@ -125,7 +125,7 @@ def test_command_in_volts_is_read_with_an_input_gain():
         (WIP + "effects: [pitch/viscous]", "effects is ['pitch/viscous'], expected names with values"),
         (
             WIP + "effects: {pitch/coulomb: {F_c: 1}, pitch/stribeck: {F_c: 1, F_s: 2, v_s: 0.1}}",
-            "describe the same friction; keep one of them",
+            "describe the same physics; keep one of them",
         ),
         (WIP + "uncertainty: {body_inertia: 0}", "body_inertia is 0, expected a relative standard deviation above 0"),
         (WIP + "uncertainty: {pitch/viscous.sigma: 0.1}", "unknown parameter 'pitch/viscous.sigma'"),

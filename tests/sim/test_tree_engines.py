@@ -39,6 +39,7 @@ TRANSMISSION = {
     "actuator_j0/gain": {"k": 0.8},
     "actuator_j0/dead_zone": {"band": 0.1},
     "actuator_j0/lag": {"tau": 0.01},
+    "actuator_j0/elasticity": {"drive_inertia": 0.05, "stiffness": 20.0, "damping": 0.1},
     "actuator_j1/saturation": {"F_max": 2.0},
     "actuator_j1/ripple": {"A": 0.2, "n": 6.0, "phase": 0.3},
     "actuator_j1/kp": {"factor": 0.8},

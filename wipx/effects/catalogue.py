@@ -103,4 +103,4 @@ def check_together(names: tuple[str, ...], plant: Plant, where: str = "effects")
         site = name.partition("/")[0]
         for other in effect_of(name, plant, where).excludes:
             if f"{site}/{other}" in names:
-                raise InputError(f"{where}: {name} and {site}/{other} describe the same friction; keep one of them")
+                raise InputError(f"{where}: {name} and {site}/{other} describe the same physics; keep one of them")

@@ -1,13 +1,14 @@
 """The path from the command to the force on a joint, in causal order; compiled.
 
 Delay, the loop of a position drive, offset, dead zone, sag, gain, saturation, speed limit, back-EMF, lag, ripple,
-backlash. A drive that reports its force knows it up to the lag; ripple and backlash are mechanical. Every part is a
-loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
+backlash or elasticity. A drive that reports its force knows it up to the lag; what follows is mechanical. Every part
+is a loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
 """
 
 from wipx.core.law import clip, inlined, law, sign, sin_cos
 from wipx.effects import backlash as backlash_law
 from wipx.effects import dead_zone, saturation, speed_limit
+from wipx.effects.trees import elasticity
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
@@ -115,6 +116,8 @@ def actuator_path(S, J, n, on, has, j):
             J[R.DRIVE * W + w] += J[R.RIPPLE * W + w] * cosine
     if has[j, R.ON_BACKLASH]:
         backlash(J, n)
+    if has[j, R.ON_ELASTICITY]:
+        elastic(J, n)
 
 
 @law
@@ -144,3 +147,43 @@ def backlash(J, n):
         if J[R.H * W + w] > 0.0:
             J[R.PASSED * W + w] = passed + rest * J[R.CONTACT_KEPT * W + w]
         J[R.DRIVE * W + w] = passed + rest * J[R.CONTACT_MEAN * W + w]
+
+
+@law
+def elastic(J, n):
+    """Pass on the force of a joint through the spring of its drive, which at first holds that force at rest."""
+    for w in range(n):
+        stiffness, damping = J[R.ELASTIC_STIFFNESS * W + w], J[R.ELASTIC_DAMPING * W + w]
+        inertia, h = J[R.ELASTIC_INERTIA * W + w], J[R.H * W + w]
+        force, begun = J[R.DRIVE * W + w], J[R.STARTED * W + w] > 0.0
+        twist = J[R.TWIST * W + w] if begun else force / stiffness
+        rate = J[R.DRIVE_RATE * W + w] if begun else J[R.V * W + w]
+        parting = elasticity.parting(stiffness, damping, inertia, h)
+        held = elasticity.passed_on(force, twist, rate, stiffness, damping, inertia, h)
+        J[R.TWIST * W + w], J[R.DRIVE_RATE * W + w] = twist, rate
+        J[R.MOTOR_FORCE * W + w], J[R.PARTING * W + w] = force, parting
+        J[R.DRIVE * W + w] = held - parting * J[R.RATE * W + w]
+
+
+@law
+def taken_back(J, n):
+    """What the spring of a drive takes back per rate of its link: linear in that of the step, which is solved for."""
+    for w in range(n):
+        J[R.FORCE * W + w] += J[R.PARTING * W + w] * J[R.RATE * W + w]
+        J[R.DAMPING * W + w] += J[R.PARTING * W + w]
+
+
+@law
+def sprung(J, n):
+    """Move the drive on its spring, after the mean rate of its link is known."""
+    for w in range(n):
+        J[R.TWIST * W + w], J[R.DRIVE_RATE * W + w] = elasticity.moved(
+            J[R.MOTOR_FORCE * W + w],
+            J[R.TWIST * W + w],
+            J[R.DRIVE_RATE * W + w],
+            J[R.RATE * W + w],
+            J[R.ELASTIC_STIFFNESS * W + w],
+            J[R.ELASTIC_DAMPING * W + w],
+            J[R.ELASTIC_INERTIA * W + w],
+            J[R.H * W + w],
+        )

@@ -9,6 +9,7 @@ from wipx.effects.hysteresis import yielding
 from wipx.effects.presliding import bristle, bristle_rate
 from wipx.effects.remainder import KNOTS
 from wipx.sim import rows as R
+from wipx.sim.actuator import sprung
 from wipx.sim.rows import W
 
 
@@ -148,15 +149,23 @@ def arrived(J, n, has, j):
         J[R.ACCELERATION * W + w] = acceleration if J[R.H * W + w] > 0.0 else last
         J[R.RATE * W + w] = 0.5 * (before + after)
     if has[j, R.ON_MEMORY]:
+        remembered(J, n, has, j)
+    if has[j, R.ON_BRISTLE]:
         for w in range(n):
-            J[R.STARTED * W + w] = maximum(J[R.STARTED * W + w], 1.0 if J[R.H * W + w] > 0.0 else 0.0)
+            z, mean = J[R.Z * W + w], J[R.RATE * W + w]
+            J[R.Z * W + w] = J[R.BRISTLE_KEPT * W + w] * z + J[R.BRISTLE_GAIN * W + w] * mean
+
+
+@inlined
+def remembered(J, n, has, j):
+    """Note that a joint has begun to move, and what its drive needs of this step in the next one."""
+    for w in range(n):
+        J[R.STARTED * W + w] = maximum(J[R.STARTED * W + w], 1.0 if J[R.H * W + w] > 0.0 else 0.0)
     if has[j, R.ON_BACKLASH]:
         for w in range(n):
             if J[R.H * W + w] > 0.0:
                 lightness = J[R.INVERSE * W + w]
                 J[R.LIGHTNESS * W + w] = lightness
                 J[R.MADE * W + w] = lightness * J[R.DRIVE * W + w]
-    if has[j, R.ON_BRISTLE]:
-        for w in range(n):
-            z, mean = J[R.Z * W + w], J[R.RATE * W + w]
-            J[R.Z * W + w] = J[R.BRISTLE_KEPT * W + w] * z + J[R.BRISTLE_GAIN * W + w] * mean
+    if has[j, R.ON_ELASTICITY]:
+        sprung(J, n)

@@ -16,7 +16,7 @@ import numpy as np
 
 from wipx.core.law import inlined, law, relaxing
 from wipx.sim import rows as R
-from wipx.sim.actuator import actuator_path, delayed_command
+from wipx.sim.actuator import actuator_path, delayed_command, taken_back
 from wipx.sim.body import double_body, wip_body
 from wipx.sim.cache import cached
 from wipx.sim.joints import arrived, drifted, levels, smooth_friction
@@ -39,6 +39,8 @@ def respond(A, S, B, n, on, has, rigid):
             J = B[j]
             levels(J, n, has, j)
             smooth_friction(S, B, J, n, has, j)
+        if has[j, R.ON_ELASTICITY]:
+            taken_back(B[j], n)
     rates_at_the_end(A, S, B, n, on, has, rigid)
     for j in range(len(has)):
         arrived(B[j], n, has, j)

@@ -26,6 +26,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     PAPER,  # lagged friction
     LAGGED,  # actuator
     PLACE, DRIVE_SPEED, PASSED,  # backlash
+    TWIST, DRIVE_RATE,  # of an elastic drive: how far it is ahead of its link, and how fast it turns
     MADE, LIGHTNESS,  # accelerations in the last step: by the drive, and by a force of one
     SWING_PLACE, SWING_RATE,
     EXTRA,  # acceleration that an observer adds
@@ -43,6 +44,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     INPUT_GAIN, DELAY, OFFSET, DEAD_BAND, SAG_TIME, SAG_LOAD, SAG_NONE,
     GAIN, FORCE_MAX, STALL, FREE_SPEED, BACK_EMF, LAG_RATE,
     RIPPLE, RIPPLE_PERIODS, RIPPLE_PHASE, GAP, DRIVE_INERTIA, DRIVE_DAMPING, RETURNED, CONTACT_RATE,
+    ELASTIC_INERTIA, ELASTIC_STIFFNESS, ELASTIC_DAMPING,
     VISCOUS, DRAG, LEVEL_PLUS, LEVEL_MINUS, STATIC, COULOMB, STRIBECK_SPEED, SPOT, SPOT_LOW, SPOT_HIGH,
     LOAD_MOTOR, LOAD_EXTERNAL,
     BRISTLE, BRISTLE_DAMPING, SLIDING, PEAK, PEAK_SPEED, EXPONENT, GAMMA,  # the last two of hysteresis
@@ -63,6 +65,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     H, PER_H,  # step and one over it, as in the rows of the whole robot
     MID, RATE,  # coordinate and rate in mid-step
     COMMAND, DRIVE, RAMP,  # command now, the force that comes of it, and its change along the row
+    MOTOR_FORCE, PARTING,  # of an elastic drive: force on it, and what its link loses of that per rate
     DELIVERED,  # integral of the drive's force over the row
     FORCE, DAMPING, PLUS, MINUS,  # on the joint; levels of dry friction against motion to either side
     INVERSE,  # own entry of the inverse of the mass matrix, with damping
@@ -94,15 +97,15 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     ON_PATH, ON_LAWS,  # any stage of the path through the drive; any law of friction beyond a level and damping
     ON_MEMORY,  # any part that must know whether it began
     ON_SERVO, ON_SPRING, ON_OFFSET, ON_DEAD_ZONE, ON_SAG, ON_GAIN, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG,
-    ON_RIPPLE, ON_BACKLASH, ON_ECCENTRICITY,
+    ON_RIPPLE, ON_BACKLASH, ON_ELASTICITY, ON_ECCENTRICITY,
     ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_HYSTERESIS, ON_PAPER, ON_REMAINDER, ON_SWING,
     JOINT_FLAGS,
     *_,
 ) = range(FLAGS, 100)  # fmt: skip
 PATH = (ON_SERVO, ON_OFFSET, ON_DEAD_ZONE, ON_SAG, ON_GAIN, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG)
-PATH += (ON_RIPPLE, ON_BACKLASH)
+PATH += (ON_RIPPLE, ON_BACKLASH, ON_ELASTICITY)
 LAWS = (ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_PAPER, ON_REMAINDER, ON_SWING)
-MEMORY = (ON_LAG, ON_BACKLASH, ON_PAPER, ON_SERVO)
+MEMORY = (ON_LAG, ON_BACKLASH, ON_ELASTICITY, ON_PAPER, ON_SERVO)
 
 # What the code of a rigid body is asked for.
 (

@@ -169,7 +169,7 @@ def test_a_suspect_that_cannot_be_is_refused(fault: str):
 def test_a_suspect_that_excludes_an_effect_of_the_nominal_model_is_refused():
     case = axis()
     nominal = case.nominal.with_effects({"translation/coulomb": {"F_c": 0.1}})
-    with pytest.raises(InputError, match="describe the same friction"):
+    with pytest.raises(InputError, match="describe the same physics"):
         check_suspects({"translation/stribeck": {}}, nominal, case.setting.scales)
 
 

@@ -7,7 +7,7 @@ from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
-from wipx.diagnosis.candidates.backlash_scan import plays
+from wipx.diagnosis.candidates.loose_drive_scan import plays
 from wipx.diagnosis.candidates.screening import basis_of
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.nonsmooth_search import alike, delays, searched_by_trial

@@ -13,8 +13,8 @@ import numpy as np
 from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
-from wipx.diagnosis.candidates.backlash_scan import plays
 from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
+from wipx.diagnosis.candidates.loose_drive_scan import plays, springs
 from wipx.diagnosis.candidates.point_mass_scan import point_masses
 from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
@@ -34,9 +34,10 @@ SCANS: dict[str, Scan] = {
     "force_limits": saturations,
     "speed_limits": speed_limits,
     "gaps": plays,
+    "springs": springs,
     "point_masses": point_masses,
 }  # first guesses that take more than a grid, by `Effect.scan`
-LOUD = (saturations, speed_limits, plays)  # of effects whose lack a joint shows plainly
+LOUD = (saturations, speed_limits, plays, springs)  # of effects whose lack a joint shows plainly
 
 
 @dataclass(frozen=True)
