@@ -67,6 +67,7 @@ APPROXIMATED = {
 LOST = {
     "actuator_j0/dead_zone": {"band": 0.5},
     "actuator_j0/backlash": {"gap": 0.05},
+    "actuator_j1/elasticity": {"drive_inertia": 0.02, "stiffness": 50.0, "damping": 0.1},
     "sensor_j0/bias": {"b": 0.1},
     "sensor_j1/scale": {"e": 0.1},
     "j1/load_friction": {"K_motor": 0.1, "K_external": 0.1},

@@ -15,8 +15,8 @@ from wipx.baselines.torque import TorqueData
 from wipx.core.effect import Effect
 from wipx.effects.catalogue import effect_of
 
-# Backlash has a state of its own, which no function of the recorded signals gives.
-WITHOUT_TERM = ("backlash",)
+# These drives have states of their own, which no function of the recorded signals gives.
+WITHOUT_TERM = ("backlash", "elasticity")
 PHASES = (0.0, 0.5 * np.pi)  # of a ripple; the opposite ones are negative sizes
 LONG = 15  # values; of two grids that are longer every second value is looked at
 

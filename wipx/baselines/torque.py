@@ -3,7 +3,7 @@
     M(q) q'' + c(q, q') + g(q) - forces,    zero for a perfect model and noiseless recordings
 
 The laws are those of contract section 3, as functions of smoothed signals: a joint is sliding or at rest by its
-smoothed rate. Backlash and everything beyond the contract are not among them.
+smoothed rate. Backlash, elasticity and everything beyond the contract are not among them.
 """
 
 from collections.abc import Callable, Mapping

@@ -3,7 +3,7 @@
 A drive is an actuator of one of two kinds. A plain one gives gain * input + bias, with limits of input and force, a
 filter of the input, and a delay. A drive whose torque falls with speed, or a servo whose torque lags, is a `dcmotor`
 with constants that make its voltage a torque: the clamp of the voltage is the torque-speed line, the current's time
-constant the lag. Dead zones and backlash have no place in MJCF.
+constant the lag. MJCF has no dead zones, no backlash and no springs between drives and links.
 """
 
 from collections.abc import Callable, Mapping

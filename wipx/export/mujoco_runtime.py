@@ -9,7 +9,7 @@
     robot.data                                # MuJoCo's own data
 
 MuJoCo moves the bodies. Wipx's laws make the commands into forces in every step: delays, servos, dead zones, limits,
-lags, backlash, every law of friction with true sticking, and what the sensors show. The result is that of
+lags, backlash, elasticity, every law of friction with true sticking, and what the sensors show. The result is that of
 `sim=mujoco`. A file into which the robot was put, with contacts and other bodies, may be given instead of the exported
 one; sticking then does not know of contact forces until the step after.
 """
