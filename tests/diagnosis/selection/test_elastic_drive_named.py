@@ -1,0 +1,35 @@
+"""A spring between drive and link is named, with its numbers, where an arm swings on it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosis.recorded import Bench
+from diagnosis.recorded_arm import arm, recorded
+
+from wipx.diagnosis.candidates.loose_drive_scan import springs
+from wipx.diagnosis.candidates.screening import basis_of
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.robot_search import search_of
+
+SPRING = "actuator_elbow/elasticity"
+TRUE = {"drive_inertia": 0.004, "stiffness": 9.0, "damping": 0.015}
+ALONE = np.sqrt(TRUE["stiffness"] / TRUE["drive_inertia"])  # [rad/s] of the drive while the link is held
+
+
+def test_the_first_guess_swings_about_as_the_true_drive_does(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects({SPRING: TRUE}), fresh_seed),), {})
+    nominal = case.fit()
+    inertia, stiffness, _ = springs(case.fitter, nominal, basis_of(nominal), SPRING)[0]
+    assert np.sqrt(stiffness / inertia) == pytest.approx(ALONE, rel=0.3)
+
+
+def test_the_spring_is_named_with_its_numbers(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects({SPRING: TRUE}), fresh_seed),), {})
+    nominal = case.fit()
+    found = search_of(FitStore.of(case.fitter, case.setting, nominal), nominal).run().fit
+    assert found.effects == (SPRING,)
+    for symbol, value in TRUE.items():
+        assert found.hypothesis.values[f"{SPRING}.{symbol}"] == pytest.approx(value, rel=0.1)
