@@ -158,19 +158,18 @@ def elastic(J, n):
         force, begun = J[R.DRIVE * W + w], J[R.STARTED * W + w] > 0.0
         twist = J[R.TWIST * W + w] if begun else force / stiffness
         rate = J[R.DRIVE_RATE * W + w] if begun else J[R.V * W + w]
-        parting = elasticity.parting(stiffness, damping, inertia, h)
-        held = elasticity.passed_on(force, twist, rate, stiffness, damping, inertia, h)
+        still, lost = elasticity.passed_on(force, twist, rate, stiffness, damping, inertia, h)
         J[R.TWIST * W + w], J[R.DRIVE_RATE * W + w] = twist, rate
-        J[R.MOTOR_FORCE * W + w], J[R.PARTING * W + w] = force, parting
-        J[R.DRIVE * W + w] = held - parting * J[R.RATE * W + w]
+        J[R.MOTOR_FORCE * W + w], J[R.TAKEN_BACK * W + w] = force, lost
+        J[R.DRIVE * W + w] = still - lost * J[R.RATE * W + w]
 
 
 @law
 def taken_back(J, n):
     """What the spring of a drive takes back per rate of its link: linear in that of the step, which is solved for."""
     for w in range(n):
-        J[R.FORCE * W + w] += J[R.PARTING * W + w] * J[R.RATE * W + w]
-        J[R.DAMPING * W + w] += J[R.PARTING * W + w]
+        J[R.FORCE * W + w] += J[R.TAKEN_BACK * W + w] * J[R.RATE * W + w]
+        J[R.DAMPING * W + w] += J[R.TAKEN_BACK * W + w]
 
 
 @law

@@ -65,7 +65,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     H, PER_H,  # step and one over it, as in the rows of the whole robot
     MID, RATE,  # coordinate and rate in mid-step
     COMMAND, DRIVE, RAMP,  # command now, the force that comes of it, and its change along the row
-    MOTOR_FORCE, PARTING,  # of an elastic drive: force on it, and what its link loses of that per rate
+    MOTOR_FORCE, TAKEN_BACK,  # of an elastic drive: force on it, and by how much less its link gets per rate
     DELIVERED,  # integral of the drive's force over the row
     FORCE, DAMPING, PLUS, MINUS,  # on the joint; levels of dry friction against motion to either side
     INVERSE,  # own entry of the inverse of the mass matrix, with damping

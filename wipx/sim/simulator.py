@@ -22,8 +22,8 @@ class Rollouts:
         coordinates: As the sensors show them, shape (K + 1, joints, P, R) [m, rad].
         rates: True rates, shape (K + 1, joints, P, R) [m/s, rad/s].
         commands: Commands of each row, shape (K, inputs, P, R) (R only open loop: (K, inputs, 1, R)).
-        delivered: Mean force of the drives over each row, before what they cannot know (ripple, backlash), shape
-            (K, inputs, P, R) [N or N m]; None where it was not asked for.
+        delivered: Mean force of the drives over each row, before what they cannot know (ripple, backlash, elasticity),
+            shape (K, inputs, P, R) [N or N m]; None where it was not asked for.
     """
 
     coordinates: np.ndarray

@@ -1,8 +1,8 @@
 """Drives that move on their own: first guesses for backlash and for elasticity.
 
 How long a drive takes to cross its gap depends on the gap times its inertia, and the likelihood has a narrow ridge
-along that product. A drive on a spring swings, and the likelihood is one of a frequency. Both are compared on a fine
-scale, for light and heavy drives.
+along that product. How well a drive on a spring fits depends above all on the frequency at which it swings. So gaps
+and frequencies are compared on a fine scale, for light and heavy drives.
 """
 
 from itertools import product
@@ -20,7 +20,9 @@ GAPS = np.geomspace(5e-4, 0.1, 13)  # of the way that the joint moves
 DRIVES = ((0.03, 0.0), (0.12, 0.0), (0.01, 200.0))  # inertia over that of the joint, and how fast grease slows it [1/s]
 RETURNED = (0.0, 1.0)  # of the momentum
 CONTACT_TIME = 5e-4  # [s]
-FREQUENCIES = np.geomspace(2.0, 60.0, 14)  # of drive and link against each other [Hz]
+FREQUENCIES = np.geomspace(
+    2.0, 60.0, 14
+)  # of drive and link against each other [Hz]; faster than a motion, slower than a log
 ON_SPRINGS = (0.1, 0.3, 1.0)  # inertia of a drive on a spring over that of the joint
 DAMPING_RATIO = 0.05
 TOGETHER = 26  # models simulated at once; bounds the memory

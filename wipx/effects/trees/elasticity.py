@@ -13,9 +13,9 @@ EFFECT = Effect(
     words="elasticity of {place}",
     sites=("drive",),
     parameters=(
-        Parameter("drive_inertia", "of the drive, at the joint", "inertia", 0.0, 0.0, 10.0, 0.5, grid=(0.5,)),
-        Parameter("stiffness", "of the spring", "stiffness", 1e3, 0.1, 1e5, 30.0, grid=(30.0,)),
-        Parameter("damping", "of the spring", "damping", 0.0, 0.0, 30.0, 0.2, grid=(0.2,)),
+        Parameter("drive_inertia", "of the drive, at the joint", "inertia", 0.0, 0.0, 10.0, 0.5),
+        Parameter("stiffness", "of the spring", "stiffness", 1e3, 0.1, 1e5, 30.0),
+        Parameter("damping", "of the spring", "damping", 0.0, 0.0, 30.0, 0.2),
     ),
     law="k d + c d', d = drive - link, J drive'' = F - k d - c d'",
     source="Spong 1987, Modeling and control of elastic joint robots, ASME JDSMC 109(4)",
@@ -29,36 +29,24 @@ LEAST = 1e-300  # stands for nothing in a denominator
 
 
 @law
-def parting(stiffness, damping, inertia, step):
-    """Mean force that the spring takes back over a step, per mean rate of the link [N s/m or N m s/rad].
-
-    Args:
-        stiffness: Of the spring [N/m or N m/rad].
-        damping: Of the spring [N s/m or N m s/rad].
-        inertia: Of the drive [kg or kg m^2].
-        step: Length of the step [s].
-    """
-    resists = 0.5 * step * stiffness + damping
-    return resists * inertia / maximum(inertia + 0.5 * step * resists, LEAST)  # the drive yields, too
-
-
-@law
 def passed_on(force, twist, rate, stiffness, damping, inertia, step):
-    """Mean force on the link over a step in which it would stand still [N or N m].
+    """What the spring passes on to the link in a step, as a line over the mean rate of the link.
 
     Args:
-        force: Of the motor on the drive.
+        force: Of the motor on the drive [N or N m].
         twist: Drive ahead of the link at the beginning [m or rad].
         rate: Of the drive at the beginning [m/s or rad/s].
         stiffness: Of the spring [N/m or N m/rad].
         damping: Of the spring [N s/m or N m s/rad].
         inertia: Of the drive [kg or kg m^2].
         step: Length of the step [s].
+
+    Returns:
+        Mean force on a link that stands still [N or N m], and how much less it is per rate of the link.
     """
-    resists = 0.5 * step * stiffness + damping
-    held = inertia * (stiffness * twist + resists * rate) + 0.5 * step * resists * force
-    whole = inertia + 0.5 * step * resists
-    return held / whole if whole > 0.0 else force
+    resistance = 0.5 * step * stiffness + damping
+    share = inertia / maximum(inertia + 0.5 * step * resistance, LEAST)
+    return share * (stiffness * twist + resistance * rate) + (1.0 - share) * force, share * resistance
 
 
 @law
@@ -77,5 +65,5 @@ def moved(force, twist, rate, link_rate, stiffness, damping, inertia, step):
     """
     half = 0.5 * step
     whole = maximum(inertia + half * (half * stiffness + damping), LEAST)
-    ahead = (inertia * (rate - link_rate) + half * (force - stiffness * twist)) / whole  # mean rate of the twist
-    return twist + step * ahead, 2.0 * (ahead + link_rate) - rate
+    parting = (inertia * (rate - link_rate) + half * (force - stiffness * twist)) / whole  # mean rate of the twist
+    return twist + step * parting, 2.0 * (parting + link_rate) - rate
