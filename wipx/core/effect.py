@@ -59,6 +59,11 @@ class FittedEffect(Protocol):
         ...
 
     @property
+    def rate(self) -> float:
+        """Rows per second of the fastest log [Hz]."""
+        ...
+
+    @property
     def latest_start(self) -> float:
         """When the last of the recordings starts [s]."""
         ...
@@ -70,18 +75,20 @@ class FittedEffect(Protocol):
 
 @dataclass(frozen=True)
 class Contains:
-    """A simpler law at the same site that the law can always imitate.
+    """A simpler law that the law can always imitate.
 
     Attributes:
         kind: The simpler law.
         when: Whether fitted numbers amount to it.
         symbols: Symbols of the simpler law that differ, by those of this law.
+        at_joint: Whether the simpler law acts at the joint of the law's drive; else at the same site.
         comes_to_rest: Whether the law also fits how a joint comes to rest, so that it must gain more than others.
     """
 
     kind: str
     when: Callable[[FittedEffect], bool]
     symbols: Mapping[str, str] = field(default_factory=dict)
+    at_joint: bool = False
     comes_to_rest: bool = False
 
 

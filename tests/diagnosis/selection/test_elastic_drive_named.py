@@ -9,7 +9,9 @@ from diagnosis.recorded_arm import arm, recorded
 
 from wipx.diagnosis.candidates.loose_drive_scan import springs
 from wipx.diagnosis.candidates.screening import basis_of
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.nested_laws import reduced_effects
 from wipx.diagnosis.selection.robot_search import search_of
 
 SPRING = "actuator_elbow/elasticity"
@@ -31,5 +33,18 @@ def test_the_spring_is_named_with_its_numbers(tmp_path: Path, fresh_seed: int):
     nominal = case.fit()
     found = search_of(FitStore.of(case.fitter, case.setting, nominal), nominal).run().fit
     assert found.effects == (SPRING,)
+    assert reduced_effects(found, case.fitter.data) is None
     for symbol, value in TRUE.items():
         assert found.hypothesis.values[f"{SPRING}.{symbol}"] == pytest.approx(value, rel=0.1)
+
+
+def test_a_drive_that_swings_unseen_is_an_inertia_at_the_joint(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    inertia = {"elbow/rotor_inertia": {"J": TRUE["drive_inertia"]}}
+    case = Bench(model, (recorded(model.with_effects(inertia), fresh_seed),), {})
+    nominal = case.fit()
+    begin = {f"{SPRING}.{symbol}": value for symbol, value in {**TRUE, "stiffness": 1000.0}.items()}
+    stiff = case.fitter.converged(case.fitter.fit(Hypothesis.of(case.setting, (SPRING,), begin), nominal.levels))
+    assert reduced_effects(stiff, case.fitter.data) == ("elbow/rotor_inertia",)
+    found = search_of(FitStore.of(case.fitter, case.setting, nominal), nominal).run().fit
+    assert found.effects == ("elbow/rotor_inertia",)

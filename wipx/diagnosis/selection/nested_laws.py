@@ -60,6 +60,11 @@ class FittedAt:
         return float(max(speeds))
 
     @property
+    def rate(self) -> float:
+        """Rows per second of the fastest log [Hz]."""
+        return max(r.rate for r in self.data.recordings)
+
+    @property
     def latest_start(self) -> float:
         """When the last of the recordings starts [s]."""
         return float(self.data.inputs.t[0].max())
@@ -85,8 +90,10 @@ class FittedAt:
 
 def simple_law(effect: str) -> str | None:
     """The simple law that an effect contains; None where it contains none."""
-    contains = kind_of(effect).contains
-    return f"{effect.partition('/')[0]}/{contains.kind}" if contains else None
+    site, contains = effect.partition("/")[0], kind_of(effect).contains
+    if contains is None:
+        return None
+    return f"{site.removeprefix('actuator_') if contains.at_joint else site}/{contains.kind}"
 
 
 def comes_to_rest(effect: str) -> bool:

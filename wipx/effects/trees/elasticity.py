@@ -4,9 +4,19 @@ The drive has a state of its own: how far it is ahead of the link, and how fast 
 linear in the mean rate of the link over a step, with which the rates of all joints are then solved for.
 """
 
-from wipx.core.effect import Effect
+from math import inf, pi, sqrt
+
+from wipx.core.effect import Contains, Effect, FittedEffect
 from wipx.core.law import law, maximum
 from wipx.core.parameters import Parameter
+
+
+def _swings_unseen(fitted: FittedEffect) -> bool:
+    """Whether the drive swings faster than half the rate of the log, which then shows nothing but its inertia."""
+    inertia = fitted.values["drive_inertia"]
+    pulsation = sqrt(fitted.values["stiffness"] / inertia) if inertia > 0.0 else inf
+    return pulsation > pi * fitted.rate
+
 
 EFFECT = Effect(
     kind="elasticity",
@@ -23,6 +33,7 @@ EFFECT = Effect(
     parts=("ELASTICITY", "DAMPING"),
     scan="springs",
     excludes=("backlash",),
+    contains=Contains("rotor_inertia", when=_swings_unseen, symbols={"drive_inertia": "J"}, at_joint=True),
 )
 
 LEAST = 1e-300  # stands for nothing in a denominator
