@@ -151,6 +151,18 @@ def test_a_position_drive_that_is_stiffer_than_believed(tmp_path: Path, fresh_se
     assert "actuator_shoulder/kp.factor" not in found
 
 
+def test_a_description_that_is_far_too_light_does_not_hide_friction(tmp_path: Path, fresh_seed: int):
+    """The heavier a joint, the less its friction would matter."""
+    hidden = {name: {"F_c": 0.2} for name in ("shoulder/coulomb", "elbow/coulomb")}
+    recording = recorded(arm(tmp_path).with_effects(hidden), fresh_seed)
+    light = ARM.replace('mass="0.3" diaginertia="0.004 0.004 0.0005"', 'mass="0.03" diaginertia="4e-4 4e-4 5e-5"')
+    (tmp_path / "arm.xml").write_text(light, encoding="utf-8")
+    model = robot_from_mapping({"plant": "robot", "model": "arm.xml"}, "robot.yaml", tmp_path).model
+    found = asked_for(model, (recording,))
+    assert found["shoulder/coulomb.F_c"] == pytest.approx(0.2, rel=0.1)
+    assert found["elbow/coulomb.F_c"] == pytest.approx(0.2, rel=0.4)
+
+
 def test_what_makes_a_joint_weightless_explains_nothing(tmp_path: Path, fresh_seed: int):
     """A joint that is five times lighter behind a drive without force would leave hardly any error in the forces."""
     model = arm(tmp_path)
@@ -222,3 +234,11 @@ def test_friction_that_takes_nearly_all_force_of_a_real_wrist_is_no_share_of_tha
     assert found["joint_4/coulomb.F_c"] == pytest.approx(2.48, rel=0.2)  # as the authors have it
     assert found["joint_4/viscous.sigma"] == pytest.approx(1.11, rel=0.2)
     assert "joint_4/load_friction.K_motor" not in found
+
+
+def test_the_light_wrist_of_a_real_description_does_not_hide_the_arms_friction():
+    source = real_arm("ur10_unisa")
+    found = asked_for(source.describe().model, source.load())
+    friction = {"shoulder_pan": 13.9, "shoulder_lift": 17.2, "elbow": 9.4}  # Petrone et al. 2025 [N m]
+    for joint, size in friction.items():
+        assert found[f"{joint}_joint/coulomb.F_c"] == pytest.approx(size, rel=0.3)

@@ -41,7 +41,7 @@ from wipx.effects.catalogue import effect_of
 from wipx.sim.tree.equations import NUMBERS
 from wipx.sim.tree.inertias import inertial_numbers
 
-GAIN = 0.2  # usual error of a drive's gain or stiffness
+GAIN = 0.2  # usual error of a drive's gain or stiffness, or a sensor's scale
 LOST = 0.2  # usual share of a force that gears lose to friction; those of servos lose up to 0.4 (Duclusaud 2025)
 STRONGEST = -0.8  # change of the needed force by a gain of five
 MISPLACED = 0.1  # of the longest link: usual error of a centre of mass
@@ -251,7 +251,7 @@ def _sensor_laws(site: str, first: int) -> dict[str, ForceLaw]:
     """The laws of a sensor, whose columns begin at `first`."""
     return {
         f"{site}/bias": _linear(np.array([first]), ("b",)),
-        f"{site}/scale": _linear(np.array([first + 1]), ("e",)),
+        f"{site}/scale": replace(_linear(np.array([first + 1]), ("e",)), usual=np.array([GAIN])),
         f"{site}/delay": _linear(np.array([first + 2]), ("tau",), 0.0),
     }
 

@@ -2,9 +2,9 @@
 
 The equations of motion of all joints hold together, each with a noise of its own, as in the identification of
 industrial robots (Swevers, Verdonck, De Schutter 2007, IEEE CSM 27(5)). What a joint lacks and no law explains yet
-counts as its noise. Effects are chosen one by one; one that is chosen may make several others superfluous. A search
-begins with the effects that are asked for here. Where no law holds exactly, the numbers are priors of what is fitted to
-predictions.
+counts as its noise. Friction of all joints comes first; then effects are chosen one by one, and those that have become
+superfluous are dropped. A search begins with the effects that are asked for here. Where no law holds exactly, the
+numbers are priors of what is fitted to predictions.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,7 +18,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.candidates.force_columns import ForceColumns, force_columns
 from wipx.diagnosis.candidates.force_laws import ForceLaw, force_laws
 from wipx.diagnosis.likelihood.hypothesis import ByForces
-from wipx.effects.catalogue import vocabulary
+from wipx.effects.catalogue import kind_of, vocabulary
 from wipx.identify.motion import independent_rows
 
 ALIKE = 1e-9  # relative, of the normal equations of columns that are nearly alike
@@ -26,6 +26,7 @@ STARTS = 2  # from which a law is fitted
 LIGHTEST = 1e-3  # of the inertia that a joint feels
 WORTH = 0.05  # an effect must take a tenth of what is left at some joint [nats a row]
 TRIALS = 40  # evaluations of a fit at most
+REWEIGHED = 3  # times that what usual laws leave counts as noise
 
 
 @dataclass(frozen=True)
@@ -210,12 +211,26 @@ def _gain_beside(regression: Regression, fit: Fitted, effect: str) -> float:
 
 def _selected(regression: Regression) -> Fitted:
     """The effects that are chosen one by one, as long as each is worth its penalty beside what is then noise."""
-    chosen, seen = regression.fit({}), set[frozenset[str]]()
+    chosen, seen = _pruned(regression, _begun(regression)), set[frozenset[str]]()
     while frozenset(chosen.numbers) not in seen:
         seen.add(frozenset(chosen.numbers))
         chosen = regression.beside(chosen)
         chosen = _pruned(regression, _with_one_more(regression, chosen))
     return chosen
+
+
+def _begun(regression: Regression) -> Fitted:
+    """The laws that the joints of nearly every machine follow.
+
+    Without them friction would be noise, and a joint the likelier, the heavier it is: too heavy for forces to matter.
+    """
+    usual = [name for name in regression.laws if kind_of(name).usual]
+    sizes, _ = regression.at_most(usual) if usual else (np.zeros(0), 0.0)
+    starts = {name: regression.laws[name].starts(sizes[regression.laws[name].columns])[0] for name in usual}
+    chosen = regression.fit(starts)
+    for _ in range(REWEIGHED):
+        chosen = regression.fit(regression.beside(chosen).numbers)
+    return regression.beside(chosen)
 
 
 def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
@@ -232,9 +247,8 @@ def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
 
 
 def _pruned(regression: Regression, chosen: Fitted) -> Fitted:
-    """Without the effects that the latest one has made superfluous."""
-    for name in list(chosen.numbers)[:-1]:
-        smaller = regression.fit({other: own for other, own in chosen.numbers.items() if other != name})
-        if smaller.score >= chosen.score:
-            return _pruned(regression, smaller)
-    return chosen
+    """Without the effects that others make superfluous, the least worthy one first."""
+    numbers = chosen.numbers
+    fewer = [regression.fit({name: own for name, own in numbers.items() if name != gone}) for gone in numbers]
+    best = max(fewer, key=lambda fit: fit.score, default=chosen)
+    return _pruned(regression, best) if best.score >= chosen.score and best is not chosen else chosen
