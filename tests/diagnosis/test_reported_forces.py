@@ -64,3 +64,14 @@ def test_a_report_that_comes_late_is_no_late_drive(kind: str, fresh_seed: int):
     plain = bench(kind, {}, fresh_seed)
     late = reporting(plain.recordings, np.random.default_rng(fresh_seed), delay=0.005)  # more than a row
     assert Bench(plain.nominal, late, {}).diagnosed().verdict == "consistent"
+
+
+def test_a_drive_that_only_holds_tells_nothing_of_its_delay():
+    """Its forces of neighbouring rows are all alike, so that no equations tell them apart."""
+    (plain, *_) = recorded("linear_axis", {}, seed=1)
+    rng, still = np.random.default_rng(1), np.ones(len(plain))
+    reported = 1.0 + 1e-5 * rng.normal(size=len(plain))
+    holding = Recording("r1.csv", {**plain.columns, "u": still, "u_measured": reported}, plain.source, plain.periods)
+    held = Bench(nominal_model("linear_axis"), (holding,), {})
+    assert held.data.reported.shape[1] == 1
+    assert np.isfinite(held.fit().log_likelihood)

@@ -19,6 +19,7 @@ from wipx.sim.simulator import Rollouts
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
 TAPS = 3  # rows of the modelled force that a report may be made of
+ALIKE = 1e-9  # relative, of the normal equations of rows that are nearly alike
 DELAY_GRID = 1e-3  # [s] to which a sensor's delay is known to the observer
 TOGETHER = 16  # rows of all models that are turned into innovations before the next
 MOST_KNOWN = 20  # gains that are kept; each holds as much as some ten recordings
@@ -186,6 +187,7 @@ def _report_weights(reported, forces, counted, size):
             for b in range(a + 1):
                 normal[1 + b, 1 + a] += force @ forces[r, begin - b : end - b]
     for a in range(1 + TAPS):
+        normal[a, a] *= 1.0 + ALIKE  # forces of neighbouring rows may be all but equal, and huge
         for b in range(a):
             normal[a, b] = normal[b, a]
     if not np.all(np.isfinite(normal)):
