@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 FIRST_STEP = 1e-4  # of the search interval, for the first slopes
 LARGEST_STEP = 0.02
 SECANT = 0.3  # standard deviations over which later slopes are taken
-DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative, tried at once
+DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative; the others are tried at once where none gains too little
+TRUSTED = 0.5  # share of the expected gain
 SETTLED = 0.05  # nats per step at which a refinement ends
 CONVERGED = 0.5  # nats at which alternating ends
 
@@ -106,16 +107,12 @@ class Fitter(ABC):
         considered: Effects that are fitted in each step of a search, at most.
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
-        at_a_time: Effects that a part of a robot of many joints gets before all numbers are fitted again; None for all.
-        rounds: Times that each of these parts gets further effects; None for as often as any gains enough.
-        exchanges: Times that they exchange their effects for better ones, at most.
+        exchanges: Times that the parts of a robot of many joints exchange their effects for better ones, at most.
     """
 
     considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
-    at_a_time: ClassVar[int | None]
-    rounds: ClassVar[int | None]
     exchanges: ClassVar[int]
 
     @property
@@ -262,14 +259,35 @@ class Fitter(ABC):
             levels: What is held fixed.
             steps: Levenberg-Marquardt steps at most.
         """
-        here = self._started(hypothesis, levels)
-        if not len(hypothesis.cube):
-            return here
-        for _ in range(steps):
-            deviations = 1.0 / np.sqrt(np.maximum(np.sum(here.jacobian**2, axis=0), 1e-12))
-            there = self._best_of(here, self._proposals(here))
+        first = self._sloped(hypothesis, levels, np.full(len(hypothesis.cube), FIRST_STEP))
+        return self._improved(first, steps, local=True)
+
+    def refit(self, fit: Fit, levels: Any, *, steps: int = 6) -> Fit:
+        """The best values at other levels than those of a fit, from its values on; arguments as `fit` has them."""
+        return self._improved(self._sloped(fit.hypothesis, levels, _secants(fit)), steps, local=False)
+
+    def _improved(self, here: Fit, steps: int, *, local: bool) -> Fit:
+        """The best values at the levels of a fit, from its values on.
+
+        Args:
+            here: The fit.
+            steps: Levenberg-Marquardt steps at most.
+            local: Whether its slopes are taken too close to tell that it cannot gain.
+        """
+        hypothesis, levels = here.hypothesis, here.levels
+        for step in range(steps if len(hypothesis.cube) else 0):
+            secants = _secants(here)
+            straight, *damped = self._proposals(here)
+            expected = _expected_gain(here, straight)
+            if expected < SETTLED and not (local and step == 0):
+                break
+            there = self._sloped(hypothesis.at(straight), levels, secants)
+            if damped and there.log_likelihood - here.log_likelihood < TRUSTED * expected:
+                other = self._best_of(here, np.stack(damped))
+                if other.log_likelihood > max(there.log_likelihood, here.log_likelihood):
+                    there = self._resloped(other, secants)
             gain = there.log_likelihood - here.log_likelihood
-            here = self._resloped(there if gain > 0.0 else here, np.clip(SECANT * deviations, 1e-6, LARGEST_STEP))
+            here = there if gain > 0.0 else self._resloped(here, secants)
             if gain < SETTLED:
                 break
         return here
@@ -292,9 +310,9 @@ class Fitter(ABC):
             space.prior_residuals(cubes) ** 2, axis=1
         )
 
-    def _started(self, hypothesis: Hypothesis, levels: Any) -> Fit:
-        """The values of a hypothesis as they are, with first slopes."""
-        cubes = _around(hypothesis.cube, np.full(len(hypothesis.cube), FIRST_STEP))
+    def _sloped(self, hypothesis: Hypothesis, levels: Any, size: np.ndarray) -> Fit:
+        """The values of a hypothesis as they are, with slopes over steps of the position in the cube, shape (D,)."""
+        cubes = _around(hypothesis.cube, size)
         errors = self._errors(hypothesis, cubes, levels)
         return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], errors[:1]), cubes, errors)
 
@@ -343,6 +361,18 @@ class Fitter(ABC):
             step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), fit.slope[free] / scale) / scale
             proposals[i, free] -= step
         return np.clip(proposals, 0.0, 1.0)
+
+
+def _secants(fit: Fit) -> np.ndarray:
+    """Steps of the position in the cube over which slopes near a fit are taken, shape (D,)."""
+    deviations = 1.0 / np.sqrt(np.maximum(np.sum(fit.jacobian**2, axis=0), 1e-12))
+    return np.clip(SECANT * deviations, 1e-6, LARGEST_STEP)
+
+
+def _expected_gain(fit: Fit, cube: np.ndarray) -> float:
+    """Log-likelihood that a fit gains at another position in the cube if its errors change in proportion [nats]."""
+    moved = cube - fit.hypothesis.cube
+    return float(-fit.slope @ moved - 0.5 * moved @ fit.information @ moved)
 
 
 def _around(cube: np.ndarray, size: np.ndarray) -> np.ndarray:

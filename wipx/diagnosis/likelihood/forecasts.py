@@ -84,8 +84,6 @@ class ForecastFitter(Fitter):
     considered = 12
     steps = 3
     close_call = 20.0
-    at_a_time = None
-    rounds = 1  # where no law holds, a second one finds what stands in for others
     exchanges = 1
     horizons: ClassVar[tuple[float, ...]] = HORIZONS
 
@@ -327,7 +325,7 @@ class ForecastFitter(Fitter):
     def converged(self, fit: Fit, *, rounds: int = 2) -> Fit:
         """Starts and values in turn until neither gains more."""
         for _ in range(rounds):
-            again = self.fit(fit.hypothesis, self.prediction_starts(fit.hypothesis.model, [fit.levels.bandwidths]))
+            again = self.refit(fit, self.prediction_starts(fit.hypothesis.model, [fit.levels.bandwidths]))
             if again.log_likelihood < fit.log_likelihood + CONVERGED:
                 return max(fit, again, key=lambda each: each.log_likelihood)
             fit = again

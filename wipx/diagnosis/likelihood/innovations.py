@@ -43,8 +43,6 @@ class InnovationFitter(Fitter):
     considered = 6
     steps = 5
     close_call = 60.0
-    at_a_time = 1
-    rounds = None
     exchanges = 2
 
     innovations_model: InnovationsModel
@@ -193,7 +191,7 @@ class InnovationFitter(Fitter):
         """Noise levels and values in turn until neither gains more."""
         for _ in range(rounds):
             before = fit.log_likelihood
-            fit = self._with_best_spread(self.fit(fit.hypothesis, self.levels_of(fit)))
+            fit = self._with_best_spread(self.refit(fit, self.levels_of(fit)))
             if fit.log_likelihood - before < CONVERGED:
                 break
         return fit
@@ -265,7 +263,7 @@ class InnovationFitter(Fitter):
 
     def _at_spread(self, fit: Fit, change: float) -> Fit:
         levels = replace(fit.levels, spread=change * fit.levels.spread)
-        return self.fit(fit.hypothesis, levels, steps=3)
+        return self.refit(fit, levels, steps=3)
 
     def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
         """Log-likelihoods of hypotheses of the same effects, as they are."""

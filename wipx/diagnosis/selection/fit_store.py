@@ -117,7 +117,7 @@ class FitStore:
 
         A search over noise levels that stopped early would credit the next effect with finishing it.
         """
-        again = self.fitter.fit(fit.hypothesis, larger.levels)
+        again = self.fitter.refit(fit, larger.levels)
         if again.log_likelihood < fit.log_likelihood + 1.0:
             return fit
         return self.keep(self.fitter.converged(again))
@@ -148,7 +148,7 @@ class FitStore:
 
     def _escaped(self, fit: Fit) -> list[Fit]:
         """Fits from near one: forces that explain a misfit make it hard to leave, louder ones smooth the likelihood."""
-        found = [self.fitter.converged(self.fitter.fit(fit.hypothesis, self.fitter.escape_levels(fit)))]
+        found = [self.fitter.converged(self.fitter.refit(fit, self.fitter.escape_levels(fit)))]
         moved = nonsmooth_search.searched_by_trial(self.fitter, fit)
         return found if moved is fit else [*found, self.fitter.converged(moved)]
 

@@ -4,9 +4,10 @@ On an arm every joint has friction. Effects of different joints hardly compete: 
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
 whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
-for (`torque_regression`). Then each part gets one effect at a time: all numbers are fitted together before the next one
-is looked for, and effects that others make superfluous are dropped. At the end the parts exchange effects for better
-ones.
+for (`torque_regression`). Then each part looks for one further effect. A motor's rotor and a load may explain the same
+motion, so that either the joints get theirs or the links, whichever explains more. All numbers are fitted together
+before the next effects are looked for, and effects that others make superfluous are dropped. At the end the parts
+exchange effects for better ones.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,7 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, Search
+from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
 from wipx.effects.catalogue import effect_of
 
 TRIED = 3  # weakest effects of the whole robot, without which it is fitted
@@ -88,9 +89,9 @@ def _effects_at(fit: Fit, sites: frozenset[str]) -> tuple[str, ...]:
     return tuple(effect for effect in fit.effects if _site(effect) in sites)
 
 
-def _side_by_side(parts: Sequence[frozenset[str]]) -> list[Sequence[frozenset[str]]]:
-    """Parts in groups that are searched at the same time: the first two, links and the loudest joint, are alone."""
-    return [group for group in (parts[:1], parts[1:2], parts[2:]) if group]
+def _has_changed(whole: Fit, sites: frozenset[str], found: Chosen) -> bool:
+    """Whether a part has other effects than in the fit of a whole robot."""
+    return set(found.fit.effects) != set(_effects_at(whole, sites))
 
 
 @dataclass(frozen=True)
@@ -128,16 +129,15 @@ class RobotSearch(Search):
 
     def run(self, begin: Fit | None = None) -> Chosen:
         """The fit of the effects that are missing; `nominal` where none is."""
-        fitter, grown = self.store.fitter, self.grown(begin, self.store.fitter.rounds)
-        whole = self._finished(grown)
-        for _ in range(fitter.exchanges):
-            other = self._changed(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
+        whole = self._finished(self.grown(begin))
+        for _ in range(self.store.fitter.exchanges):
+            found = self._found_by_parts(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
+            other = self._with_parts(whole.fit, found, tuple(found))
             fewer = len(other.fit.effects) < len(whole.fit.effects)
             least = -self.rules.least_gain if fewer else 0.0
             if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= least:
                 return Chosen(whole.fit, whole.considered + other.considered)
-            grown = self.grown(other.fit, fitter.rounds)
-            whole = self._finished(grown).after(whole.considered + other.considered)
+            whole = self._finished(self.grown(other.fit)).after(whole.considered + other.considered)
         return whole
 
     def _finished(self, grown: Chosen) -> Chosen:
@@ -146,38 +146,57 @@ class RobotSearch(Search):
         return Chosen(self.store.escaped(pruned.fit), pruned.considered)
 
     def grown(self, begin: Fit | None = None, steps: int | None = None) -> Chosen:
-        """The fit with further effects of all parts in turn, as often as `steps` says or as any gains enough."""
+        """The fit with further effects, one at a time of each part, as often as `steps` says or as any gains enough.
+
+        A part that finds nothing rests until the others find nothing more.
+        """
         whole = Chosen(begin or self.begun())
-        seen = set[frozenset[str]]()
-        while len(seen) != steps and frozenset(whole.fit.effects) not in seen:
-            seen.add(frozenset(whole.fit.effects))
-            for parts in _side_by_side(self._order(whole.fit)):
-                whole = self._changed(whole.fit, parts, self._grown_in).after(whole.considered)
+        every = awake = parts_of(self.plant)
+        seen = {frozenset(whole.fit.effects)}
+        while awake and len(seen) - 1 != steps:
+            found = self._found_by_parts(whole.fit, awake, self._grown_in)
+            of_links = self._with_parts(whole.fit, found, every[:1])
+            of_joints = self._with_parts(whole.fit, found, every[1:])
+            better = max(of_links, of_joints, key=lambda each: self.criteria.score_lead(each.fit, whole.fit)).fit
+            considered = whole.considered + of_links.considered + of_joints.considered
+            if frozenset(better.effects) in seen:
+                awake = tuple(sites for sites in every if sites not in awake)
+                whole = Chosen(whole.fit, considered)
+            else:
+                seen.add(frozenset(better.effects))
+                awake = tuple(sites for sites in awake if _has_changed(whole.fit, sites, found[sites]))
+                whole = Chosen(better, considered)
         return whole
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
-        """A part with further effects, where any may gain enough."""
+        """A part with a further effect, where any may gain enough."""
         if not store.is_promising(own):
             return Chosen(own)
-        return self._search_in(store, own).grown(own, steps=store.fitter.at_a_time)
+        return self._search_in(store, own).grown(own, steps=1)
 
     def _exchanged_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with better effects in the place of its own."""
         return self._search_in(store, own).exchanged(own)
 
-    def _changed(
+    def _found_by_parts(
         self, whole: Fit, parts: Sequence[frozenset[str]], change: Callable[[FitStore, Fit], Chosen]
-    ) -> Chosen:
-        """A fit after a change of some parts, each by itself beside all that the others have."""
+    ) -> dict[frozenset[str], Chosen]:
+        """What some parts of a fit become, each by itself beside all that the others have."""
         found = self.store.fitter.simulator.side_by_side(lambda sites: change(*self._part(whole, sites)), parts)
-        considered = tuple(each for chosen in found for each in chosen.considered)
+        return dict(zip(parts, found, strict=True))
+
+    def _with_parts(
+        self, whole: Fit, found: Mapping[frozenset[str], Chosen], parts: Sequence[frozenset[str]]
+    ) -> Chosen:
+        """A fit with what some parts have become; the same fit where none has other effects."""
         held = Held.of(whole)
-        for sites, chosen in zip(parts, found, strict=True):
-            if set(chosen.fit.effects) != set(_effects_at(whole, sites)):
-                held = held.with_part(sites, chosen.fit)
-        if set(held.effects) == set(whole.effects):
-            return Chosen(whole, considered)
-        return Chosen(self._together(held), considered)
+        considered: History = ()
+        for sites in parts:
+            if sites in found:
+                considered += found[sites].considered
+            if sites in found and _has_changed(whole, sites, found[sites]):
+                held = held.with_part(sites, found[sites].fit)
+        return Chosen(whole if set(held.effects) == set(whole.effects) else self._together(held), considered)
 
     def begun(self) -> Fit:
         """The fit of the effects that recorded forces ask for, as far as they are worth it."""
@@ -198,14 +217,6 @@ class RobotSearch(Search):
         """The fit of effects that were found without this search."""
         hypothesis = Hypothesis.of(self.store.setting, effects, {**self.nominal.hypothesis.values, **values})
         return self.store.keep(self.store.fitter.first_fit(hypothesis, self.nominal.levels))
-
-    def _order(self, fit: Fit) -> tuple[frozenset[str], ...]:
-        """The parts: links and base, then the joints on which the observer asks for most force beside its usual one."""
-        rest, *joints = parts_of(self.plant)
-        scales = self.store.setting.scales
-        by_row = self.store.fitter.sketched_by_row(fit)[1].levels
-        usual = np.array([scales[site].force for site in self.plant.joints])
-        return (rest, *(joints[j] for j in np.argsort(-by_row.force / usual)))
 
     def exchanged(self, fit: Fit) -> Chosen:
         """Every part searched again, from the effects of a fit on."""
