@@ -152,6 +152,7 @@ class RobotSearch(Search):
         """
         whole = Chosen(begin or self.begun())
         every = awake = parts_of(self.plant)
+        asked = set[frozenset[str]]()  # beside the effects that there are now
         seen = {frozenset(whole.fit.effects)}
         while awake and len(seen) - 1 != steps:
             found = self._found_by_parts(whole.fit, awake, self._grown_in)
@@ -160,9 +161,11 @@ class RobotSearch(Search):
             better = max(of_links, of_joints, key=lambda each: self.criteria.score_lead(each.fit, whole.fit)).fit
             considered = whole.considered + of_links.considered + of_joints.considered
             if frozenset(better.effects) in seen:
-                awake = tuple(sites for sites in every if sites not in awake)
+                asked |= set(awake)
+                awake = tuple(sites for sites in every if sites not in asked)
                 whole = Chosen(whole.fit, considered)
             else:
+                asked = set()
                 seen.add(frozenset(better.effects))
                 awake = tuple(sites for sites in awake if _has_changed(whole.fit, sites, found[sites]))
                 whole = Chosen(better, considered)
