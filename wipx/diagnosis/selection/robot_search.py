@@ -4,13 +4,13 @@ On an arm every joint has friction. Effects of different joints hardly compete: 
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
 whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
-for (`torque_regression`). Then each part looks for one further effect. A motor's rotor and a load may explain the same
-motion, so that either the joints get theirs or the links, whichever explains more. All numbers are fitted together
-before the next effects are looked for, and effects that others make superfluous are dropped. At the end the parts
-exchange effects for better ones.
+for (`torque_regression`). Then each part looks for one further effect. A load and the rotors of motors that carry it may
+explain the same motion, so that either the link gets its effect or these joints get theirs, whichever explains more.
+All numbers are fitted together before the next effects are looked for, and effects that others make superfluous
+are dropped. At the end the parts exchange effects for better ones.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -89,6 +89,11 @@ def _effects_at(fit: Fit, sites: frozenset[str]) -> tuple[str, ...]:
     return tuple(effect for effect in fit.effects if _site(effect) in sites)
 
 
+def _considered(found: Mapping[frozenset[str], Chosen]) -> History:
+    """What the searches of some parts looked at."""
+    return tuple(each for chosen in found.values() for each in chosen.considered)
+
+
 def _has_changed(whole: Fit, sites: frozenset[str], found: Chosen) -> bool:
     """Whether a part has other effects than in the fit of a whole robot."""
     return set(found.fit.effects) != set(_effects_at(whole, sites))
@@ -132,7 +137,7 @@ class RobotSearch(Search):
         whole = self._finished(self.grown(begin))
         for _ in range(self.store.fitter.exchanges):
             found = self._found_by_parts(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
-            other = self._with_parts(whole.fit, found, tuple(found))
+            other = Chosen(self._with_parts(whole.fit, found, found), _considered(found))
             fewer = len(other.fit.effects) < len(whole.fit.effects)
             least = -self.rules.least_gain if fewer else 0.0
             if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= least:
@@ -156,10 +161,9 @@ class RobotSearch(Search):
         seen = {frozenset(whole.fit.effects)}
         while awake and len(seen) - 1 != steps:
             found = self._found_by_parts(whole.fit, awake, self._grown_in)
-            of_links = self._with_parts(whole.fit, found, every[:1])
-            of_joints = self._with_parts(whole.fit, found, every[1:])
-            better = max(of_links, of_joints, key=lambda each: self.criteria.score_lead(each.fit, whole.fit)).fit
-            considered = whole.considered + of_links.considered + of_joints.considered
+            fits = [self._with_parts(whole.fit, found, parts) for parts in self._either(whole.fit, found)]
+            better = max(fits, key=lambda fit: self.criteria.score_lead(fit, whole.fit))
+            considered = whole.considered + _considered(found)
             if frozenset(better.effects) in seen:
                 asked |= set(awake)
                 awake = tuple(sites for sites in every if sites not in asked)
@@ -188,18 +192,32 @@ class RobotSearch(Search):
         found = self.store.fitter.simulator.side_by_side(lambda sites: change(*self._part(whole, sites)), parts)
         return dict(zip(parts, found, strict=True))
 
-    def _with_parts(
-        self, whole: Fit, found: Mapping[frozenset[str], Chosen], parts: Sequence[frozenset[str]]
-    ) -> Chosen:
+    def _either(self, whole: Fit, found: Mapping[frozenset[str], Chosen]) -> list[list[frozenset[str]]]:
+        """Parts that may change together: all joints; or the links, and the joints that do not carry them."""
+        links, *joints = parts_of(self.plant)
+        if links not in found or not _has_changed(whole, links, found[links]):
+            return [[sites for sites in joints if sites in found]]
+        carrying = self._carrying(set(found[links].fit.effects) - set(whole.effects))
+        apart = [sites for sites in joints if sites in found and sites.isdisjoint(carrying)]
+        return [[links, *apart], [sites for sites in joints if sites in found]]
+
+    def _carrying(self, effects: Iterable[str]) -> set[str]:
+        """Joints that carry the links at which effects act; all joints for those of the base and of all drives."""
+        tree = self.plant.tree
+        assert tree is not None
+        carrying = set[str]()
+        for site in map(_site, effects):
+            own = [i for i, link in enumerate(tree.links) if f"link_{link.body}" == site]
+            carrying |= {tree.joints[k] for i in own for k in (i, *tree.ancestors(i))} if own else set(tree.joints)
+        return carrying
+
+    def _with_parts(self, whole: Fit, found: Mapping[frozenset[str], Chosen], parts: Iterable[frozenset[str]]) -> Fit:
         """A fit with what some parts have become; the same fit where none has other effects."""
         held = Held.of(whole)
-        considered: History = ()
         for sites in parts:
-            if sites in found:
-                considered += found[sites].considered
-            if sites in found and _has_changed(whole, sites, found[sites]):
+            if _has_changed(whole, sites, found[sites]):
                 held = held.with_part(sites, found[sites].fit)
-        return Chosen(whole if set(held.effects) == set(whole.effects) else self._together(held), considered)
+        return whole if set(held.effects) == set(whole.effects) else self._together(held)
 
     def begun(self) -> Fit:
         """The fit of the effects that recorded forces ask for, as far as they are worth it."""
