@@ -4,9 +4,9 @@ On an arm every joint has friction. Effects of different joints hardly compete: 
 for noise of the forces on that joint. So each joint, with its drive and its sensor, is searched by itself, beside what
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
 whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
-for (`torque_regression`). Then each part looks for one further effect. A load and the rotors of motors that carry it may
-explain the same motion, so that either the link gets its effect or these joints get theirs, whichever explains more.
-All numbers are fitted together before the next effects are looked for, and effects that others make superfluous
+for (`torque_regression`). Then each part looks for one further effect. A load and the rotors of motors that carry it
+may explain the same motion, so that either the link gets its effect or these joints get theirs, whichever explains
+more. All numbers are fitted together before the next effects are looked for, and effects that others make superfluous
 are dropped. At the end the parts exchange effects for better ones.
 """
 
