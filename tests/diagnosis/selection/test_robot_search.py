@@ -4,12 +4,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from diagnosis.recorded import bench
+import pytest
+from diagnosis.recorded import Bench, bench
+from diagnosis.recorded_arm import arm, recorded
 from sim.random_trees import mjcf
 
 from wipx.core.plant import robot_plant
 from wipx.diagnosis.selection.criteria import evidence
-from wipx.diagnosis.selection.robot_search import expected_loss, parts_of
+from wipx.diagnosis.selection.fit_store import FitStore
+from wipx.diagnosis.selection.robot_search import RobotSearch, expected_loss, parts_of
 from wipx.recordings.robot_model import read_tree
 
 
@@ -42,3 +45,20 @@ def test_an_effect_that_does_nothing_is_no_loss_whatever_its_other_numbers(fresh
     cube[speed], jacobian[:, speed] = 0.7, 0.0
     nothing = replace(fit, hypothesis=fit.hypothesis.at(cube), jacobian=jacobian)
     assert abs(expected_loss(nothing, "translation/stribeck")) < 1e-6
+
+
+ROTOR = {"elbow/rotor_inertia": {"J": 0.01}}
+LOAD = {"link_lower/payload": {"mass": 0.1, "x": 0.01, "y": 0.02, "z": -0.25}}
+FRICTION = {"shoulder/coulomb": {"F_c": 0.08}, "elbow/coulomb": {"F_c": 0.04}}
+
+
+@pytest.mark.parametrize("hidden", [ROTOR | FRICTION, LOAD | FRICTION], ids=["rotor", "load"])
+def test_a_load_and_a_rotor_are_told_apart_beside_friction(
+    hidden: dict[str, dict[str, float]], tmp_path: Path, fresh_seed: int
+):
+    """Without what recorded forces say beforehand."""
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects(hidden), fresh_seed),), {})
+    nominal = case.fit()
+    search = RobotSearch.of(FitStore.of(case.fitter, case.setting, nominal), nominal)
+    assert set(search.run(nominal).fit.effects) == hidden.keys()

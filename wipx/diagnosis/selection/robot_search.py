@@ -5,12 +5,11 @@ for noise of the forces on that joint. So each joint, with its drive and its sen
 has been found elsewhere (block coordinate descent; Bertsekas 1999, Nonlinear Programming, sec. 2.7). Links and base,
 whose effects act on several joints at once, are one more part. The search begins with the laws that recorded forces ask
 for (`torque_regression`). Then each part looks for one further effect. A load and the rotors of motors that carry it
-may explain the same motion, so that either the link gets its effect or these joints get theirs, whichever explains
-more. All numbers are fitted together before the next effects are looked for, and effects that others make superfluous
-are dropped. At the end the parts exchange effects for better ones.
+may explain the same motion. So what all parts have found is fitted together, and effects that others make superfluous
+are dropped before the next ones are looked for. At the end the parts exchange effects for better ones.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -137,7 +136,7 @@ class RobotSearch(Search):
         whole = self._finished(self.grown(begin))
         for _ in range(self.store.fitter.exchanges):
             found = self._found_by_parts(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
-            other = Chosen(self._with_parts(whole.fit, found, found), _considered(found))
+            other = Chosen(self._with_parts(whole.fit, found), _considered(found))
             fewer = len(other.fit.effects) < len(whole.fit.effects)
             least = -self.rules.least_gain if fewer else 0.0
             if other.fit is whole.fit or self.criteria.lead(other.fit, whole.fit) <= least:
@@ -161,22 +160,22 @@ class RobotSearch(Search):
         seen = {frozenset(whole.fit.effects)}
         while awake and len(seen) - 1 != steps:
             found = self._found_by_parts(whole.fit, awake, self._grown_in)
-            fits = [self._with_parts(whole.fit, found, parts) for parts in self._either(whole.fit, found)]
-            better = max(fits, key=lambda fit: self.criteria.score_lead(fit, whole.fit))
-            considered = whole.considered + _considered(found)
-            if frozenset(better.effects) in seen:
+            larger = self.pruned(self._with_parts(whole.fit, found)).after(whole.considered + _considered(found))
+            if frozenset(larger.fit.effects) in seen:
                 asked |= set(awake)
                 awake = tuple(sites for sites in every if sites not in asked)
-                whole = Chosen(whole.fit, considered)
+                whole = Chosen(whole.fit, larger.considered)
             else:
                 asked = set()
-                seen.add(frozenset(better.effects))
+                seen.add(frozenset(larger.fit.effects))
                 awake = tuple(sites for sites in awake if _has_changed(whole.fit, sites, found[sites]))
-                whole = Chosen(better, considered)
+                whole = larger
         return whole
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
-        """A part with a further effect, where any may gain enough."""
+        """A part with a further effect, where any may gain enough; laws that need no longer be rich are simple."""
+        if own.effects:
+            own = self._search_in(store, own).preferred([own], store.nominal) or own
         if not store.is_promising(own):
             return Chosen(own)
         return self._search_in(store, own).grown(own, steps=1)
@@ -192,31 +191,12 @@ class RobotSearch(Search):
         found = self.store.fitter.simulator.side_by_side(lambda sites: change(*self._part(whole, sites)), parts)
         return dict(zip(parts, found, strict=True))
 
-    def _either(self, whole: Fit, found: Mapping[frozenset[str], Chosen]) -> list[list[frozenset[str]]]:
-        """Parts that may change together: all joints; or the links, and the joints that do not carry them."""
-        links, *joints = parts_of(self.plant)
-        if links not in found or not _has_changed(whole, links, found[links]):
-            return [[sites for sites in joints if sites in found]]
-        carrying = self._carrying(set(found[links].fit.effects) - set(whole.effects))
-        apart = [sites for sites in joints if sites in found and sites.isdisjoint(carrying)]
-        return [[links, *apart], [sites for sites in joints if sites in found]]
-
-    def _carrying(self, effects: Iterable[str]) -> set[str]:
-        """Joints that carry the links at which effects act; all joints for those of the base and of all drives."""
-        tree = self.plant.tree
-        assert tree is not None
-        carrying = set[str]()
-        for site in map(_site, effects):
-            own = [i for i, link in enumerate(tree.links) if f"link_{link.body}" == site]
-            carrying |= {tree.joints[k] for i in own for k in (i, *tree.ancestors(i))} if own else set(tree.joints)
-        return carrying
-
-    def _with_parts(self, whole: Fit, found: Mapping[frozenset[str], Chosen], parts: Iterable[frozenset[str]]) -> Fit:
+    def _with_parts(self, whole: Fit, found: Mapping[frozenset[str], Chosen]) -> Fit:
         """A fit with what some parts have become; the same fit where none has other effects."""
         held = Held.of(whole)
-        for sites in parts:
-            if _has_changed(whole, sites, found[sites]):
-                held = held.with_part(sites, found[sites].fit)
+        for sites, chosen in found.items():
+            if _has_changed(whole, sites, chosen):
+                held = held.with_part(sites, chosen.fit)
         return whole if set(held.effects) == set(whole.effects) else self._together(held)
 
     def begun(self) -> Fit:
