@@ -113,6 +113,10 @@ class Regression:
         starts = [{**kept, effect: start} for start in law.starts(sizes[law.columns])]
         return sorted(starts, key=lambda start: -self._likelihood(self._sizes(start)))
 
+    def is_felt_by_several(self, effect: str) -> bool:
+        """Whether several joints feel an effect."""
+        return int(self._felt[effect].sum()) > 1
+
     def most_with(self, fit: Fitted, effect: str) -> float:
         """Score that a fit with one effect more reaches at most."""
         return self.at_most([*self._beside(fit, effect), effect])[1]
@@ -215,7 +219,8 @@ def _selected(regression: Regression) -> Fitted:
     while frozenset(chosen.numbers) not in seen:
         seen.add(frozenset(chosen.numbers))
         chosen = regression.beside(chosen)
-        chosen = _pruned(regression, _with_one_more(regression, chosen))
+        larger = _with_one_more(regression, chosen)
+        chosen = _pruned(regression, larger) if larger is not chosen else _exchanged(regression, chosen)
     return chosen
 
 
@@ -243,6 +248,16 @@ def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
             break
         trials = [regression.fit(start) for start in regression.starts_with(chosen, name)[:STARTS]]
         best = max((best, *trials), key=lambda fit: fit.score)
+    return best
+
+
+def _exchanged(regression: Regression, chosen: Fitted) -> Fitted:
+    """The best fit in which an effect that several joints feel takes the place of others; the same if none is better."""
+    best = chosen
+    for name in regression.laws:
+        if name not in chosen.numbers and regression.is_felt_by_several(name):
+            larger = [regression.fit(start) for start in regression.starts_with(chosen, name)[:1]]
+            best = max((best, *(_pruned(regression, fit) for fit in larger)), key=lambda fit: fit.score)
     return best
 
 
