@@ -252,7 +252,7 @@ def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:
 
 
 def _exchanged(regression: Regression, chosen: Fitted) -> Fitted:
-    """The best fit in which an effect that several joints feel takes the place of others; the same if none is better."""
+    """The best fit in which one effect that several joints feel takes the place of others; the same without any."""
     best = chosen
     for name in regression.laws:
         if name not in chosen.numbers and regression.is_felt_by_several(name):
