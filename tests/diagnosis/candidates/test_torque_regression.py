@@ -160,7 +160,7 @@ def test_a_description_that_is_far_too_light_does_not_hide_friction(tmp_path: Pa
     model = robot_from_mapping({"plant": "robot", "model": "arm.xml"}, "robot.yaml", tmp_path).model
     found = asked_for(model, (recording,))
     assert found["shoulder/coulomb.F_c"] == pytest.approx(0.2, rel=0.1)
-    assert found["elbow/coulomb.F_c"] == pytest.approx(0.2, rel=0.4)
+    assert found["elbow/coulomb.F_c"] == pytest.approx(0.2, rel=0.1)
 
 
 def test_what_makes_a_joint_weightless_explains_nothing(tmp_path: Path, fresh_seed: int):

@@ -26,7 +26,6 @@ STARTS = 2  # from which a law is fitted
 LIGHTEST = 1e-3  # of the inertia that a joint feels
 WORTH = 0.05  # an effect must take a tenth of what is left at some joint [nats a row]
 TRIALS = 40  # evaluations of a fit at most
-REWEIGHED = 3  # times that what usual laws leave counts as noise
 
 
 @dataclass(frozen=True)
@@ -227,15 +226,12 @@ def _selected(regression: Regression) -> Fitted:
 def _begun(regression: Regression) -> Fitted:
     """The laws that the joints of nearly every machine follow.
 
-    Without them friction would be noise, and a joint the likelier, the heavier it is: too heavy for forces to matter.
+    If friction counted as noise, the fit would prefer joints that are too heavy for it to matter.
     """
     usual = [name for name in regression.laws if kind_of(name).usual]
     sizes, _ = regression.at_most(usual) if usual else (np.zeros(0), 0.0)
     starts = {name: regression.laws[name].starts(sizes[regression.laws[name].columns])[0] for name in usual}
-    chosen = regression.fit(starts)
-    for _ in range(REWEIGHED):
-        chosen = regression.fit(regression.beside(chosen).numbers)
-    return regression.beside(chosen)
+    return regression.beside(regression.fit(starts))
 
 
 def _with_one_more(regression: Regression, chosen: Fitted) -> Fitted:

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 FIRST_STEP = 1e-4  # of the search interval, for the first slopes
 LARGEST_STEP = 0.02
 SECANT = 0.3  # standard deviations over which later slopes are taken
-DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative; the others are tried at once where none gains too little
-TRUSTED = 0.5  # share of the expected gain
+DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative; the first step is tried alone, the others together if it fails
+TRUSTED = 0.5  # share of what a linear model expects that a step must gain (Nocedal, Wright 2006, ch. 4)
 SETTLED = 0.05  # nats per step at which a refinement ends
 CONVERGED = 0.5  # nats at which alternating ends
 
@@ -285,9 +285,9 @@ class Fitter(ABC):
             if damped and there.log_likelihood - here.log_likelihood < TRUSTED * expected:
                 other = self._best_of(here, np.stack(damped))
                 if other.log_likelihood > max(there.log_likelihood, here.log_likelihood):
-                    there = self._resloped(other, secants)
+                    there = self._sloped(other.hypothesis, levels, secants)
             gain = there.log_likelihood - here.log_likelihood
-            here = there if gain > 0.0 else self._resloped(here, secants)
+            here = there if gain > 0.0 else self._sloped(here.hypothesis, levels, secants)
             if gain < SETTLED:
                 break
         return here
@@ -314,17 +314,9 @@ class Fitter(ABC):
         """The values of a hypothesis as they are, with slopes over steps of the position in the cube, shape (D,)."""
         cubes = _around(hypothesis.cube, size)
         errors = self._errors(hypothesis, cubes, levels)
-        return self._with_slopes(self._likeliest(hypothesis, levels, cubes[:1], errors[:1]), cubes, errors)
-
-    def _resloped(self, fit: Fit, size: np.ndarray) -> Fit:
-        """A fit with slopes over steps of the position in the cube, shape (D,)."""
-        cubes = _around(fit.hypothesis.cube, size)
-        return self._with_slopes(fit, cubes, self._errors(fit.hypothesis, cubes, fit.levels))
-
-    def _with_slopes(self, fit: Fit, cubes: np.ndarray, errors: np.ndarray) -> Fit:
-        """A fit with slopes of white errors and priors, from the positions around it and their errors."""
+        fit = self._likeliest(hypothesis, levels, cubes[:1], errors[:1])
         white = self.whitened(errors, fit.noise).reshape(len(cubes), -1)
-        rows = np.concatenate([white, fit.hypothesis.space.prior_residuals(cubes)], axis=1)
+        rows = np.concatenate([white, hypothesis.space.prior_residuals(cubes)], axis=1)
         return replace(fit, jacobian=((rows[1:] - rows[0]) / np.diag(cubes[1:] - cubes[0])[:, None]).T)
 
     def _best_of(self, fit: Fit, cubes: np.ndarray) -> Fit:

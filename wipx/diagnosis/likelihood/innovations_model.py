@@ -173,7 +173,7 @@ def _report_errors(reported, delivered, counted, last, first, out):
 @cached
 def _report_weights(reported, forces, counted, size):
     """Zero and weights of one drive's report, and whether the modelled force is finite."""
-    normal, right = 1e-9 * size * size * np.eye(1 + TAPS), np.zeros(1 + TAPS)
+    normal, right = ALIKE * size * size * np.eye(1 + TAPS), np.zeros(1 + TAPS)
     for r in range(len(forces)):
         begin = max(np.argmax(counted[:, r]), TAPS - 1)  # rows that count follow each other
         end = max(begin, np.argmax(counted[:, r]) + counted[:, r].sum() - 1)  # the last row has no force
