@@ -85,7 +85,7 @@ def error_over_claim(model: Model, recording: Recording, true: np.ndarray, noise
     smoother = Smoother(ENGINE, model.plant, (recording,), noise)
     rows = np.arange(200, len(recording) - 50, 5)
     bandwidth = np.full(len(noise), 3.0)
-    places = Places(rows, np.zeros_like(rows))
+    places = Places(rows, np.zeros_like(rows), rows)
     found = smoother.along(model, bandwidth)[rows, :, 0]
     claimed = np.sqrt(np.diagonal(smoother.filtered(model, bandwidth, places).spread(), axis1=1, axis2=2))
     return np.sqrt(np.mean(((found - true[rows]) / claimed) ** 2, axis=0))

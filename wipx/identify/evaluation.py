@@ -162,7 +162,7 @@ class Judge:
         windows = starts.windows
         rows = windows.row + starts.until
         bandwidth = np.full(len(self.noise), RIGHT)
-        covariance = smoother.filtered(model, bandwidth, Places(rows, windows.recording)).spread()
+        covariance = smoother.filtered(model, bandwidth, Places(rows, windows.recording, rows)).spread()
         factors = np.linalg.cholesky(covariance + 1e-18 * np.eye(covariance.shape[1]))
         base = self._replayed(model, starts, 1)
         variance = np.zeros_like(base[:, :, 0]) + (self.noise**2)[:, None]

@@ -23,10 +23,12 @@ class Places(NamedTuple):
     Attributes:
         rows: Shape (W,).
         recordings: Whose rows, shape (W,).
+        starts: Rows after which the state at each may use `LOOK_AHEAD`, shape (W,).
     """
 
     rows: np.ndarray
     recordings: np.ndarray
+    starts: np.ndarray
 
 
 class Gains(NamedTuple):
@@ -64,6 +66,11 @@ class Filter:
     until: np.ndarray
 
     @cached_property
+    def corrections(self) -> np.ndarray:
+        """From what the sensors show to the states, shape (K + 1, R, n, joints)."""
+        return self.along.gains / self.scale
+
+    @cached_property
     def _seen(self) -> np.ndarray:
         """What the sensors show at every row of the state after the row before, shape (K + 1, R, joints, n)."""
         joints = len(self.late)
@@ -85,7 +92,8 @@ class Filter:
         """
         told = np.swapaxes(self._seen, 2, 3) @ (self.along.innovation @ surprises)
         found = np.empty((len(self.until), *prior.shape[2:]))
-        _smooth(self.along, self._closed, told, *self.places, self.until, prior, surprises, found)
+        rows, recordings, _ = self.places
+        _smooth(self.along, self._closed, told, rows, recordings, self.until, prior, surprises, found)
         return found
 
     def spread(self) -> np.ndarray:
@@ -93,7 +101,7 @@ class Filter:
 
         Innovations are white, so each later one takes its own share off.
         """
-        rows, recordings = self.places
+        rows, recordings, _ = self.places
         size = 2 * len(self.late)
         found = self.along.covariance[rows, recordings][:, :size]
         error, found = found, found[:, :, :size].copy()
@@ -263,18 +271,22 @@ def _wander(p, rate, dt):
 def _smooth(along, closed, told, rows, recordings, until, prior, surprises, found):
     """States at some rows from those before their correction, the innovations there, and those of later rows.
 
-    What an innovation tells of the state after the row before, `told` (K + 1, R, n, P), is carried backwards.
+    What an innovation tells of the state after the row before, `told` (K + 1, R, n, P), is carried backwards: from one
+    row to an earlier one of the same stretch, or anew from the last row that a state may use.
     """
     n, models = told.shape[2:]
-    carried = np.zeros((2, n, models))
+    now, after = np.zeros((n, models)), np.zeros((n, models))
+    reached = 0
     for w in range(len(rows)):
         k, r = rows[w], recordings[w]
-        now = carried[0]
-        now[:] = 0.0
-        for i in range(until[w], k, -1):
-            now, after = carried[(until[w] - i + 1) % 2], carried[(until[w] - i) % 2]
-            now[:] = told[i, r]
-            _add_product(closed[i, r], after, now)
+        if w == 0 or r != recordings[w - 1] or until[w] != until[w - 1] or k > reached:
+            now[:] = 0.0
+            reached = until[w]
+        while reached > k:
+            now, after = after, now
+            now[:] = told[reached, r]
+            _add_product(closed[reached, r], after, now)
+            reached -= 1
         found[w] = prior[k, r]
         _add_product(along.gains[k, r].T, surprises[k, r], found[w])
         _add_product(along.covariance[k, r], now, found[w])

@@ -64,13 +64,16 @@ class Smoother:
             bandwidth: Of each joint's filter, shape (joints,) [rad/s].
         """
         rows, joints, recordings = self._measured.shape
-        every = Places(*np.nonzero(np.arange(rows)[:, None] <= self._inputs.last))
+        row, recording = np.nonzero(np.arange(rows)[:, None] <= self._inputs.last)
+        every = Places(row, recording, row)
         found = np.zeros((rows, recordings, 2 * joints))
-        found[every] = self.following(ModelBatch(model), [self.filtered(model, bandwidth, every)])[0]
+        found[row, recording] = self.following(ModelBatch(model), [self.filtered(model, bandwidth, every)])[0]
         return found.transpose(0, 2, 1)
 
     def following(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
         """States of P models, as `along` has them, at the W places of their filters, shape (P, W, 2 joints).
+
+        They are estimated from the rows up to `LOOK_AHEAD` after the start that a place leads to.
 
         Args:
             batch: The models.
@@ -121,7 +124,7 @@ class Smoother:
             model: The model.
             bandwidth: Of each joint's filter, shape (joints,) [rad/s].
         """
-        nowhere = Places(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))
+        nowhere = Places(*np.zeros((3, 0), dtype=np.int64))
         each = self.filtered(model, bandwidth, nowhere)
         shown = self._followed(ModelBatch(model), [each], np.zeros(1, dtype=np.int64))
         joints = self._measured.shape[1]
@@ -130,18 +133,9 @@ class Smoother:
 
     def _followed(self, batch: ModelBatch, filters: Sequence[Filter], group: np.ndarray) -> Rollouts:
         """What P models, each kept close by one of the filters, show at every row before they are corrected there."""
-        inputs, measured = self._inputs, self._measured
-        joints, recordings = measured.shape[1:]
-        gains = np.stack([each.along.gains / each.scale for each in filters])
-        recorded = np.zeros((len(measured), 2 * joints, recordings))
-        recorded[:, :joints] = measured
-        corrections = np.zeros((*gains.shape[:3], 2 * joints, 2 * joints))
-        corrections[..., :joints] = gains[..., : 2 * joints, :]
-        drift = np.zeros((*gains.shape[:3], joints, 2 * joints))
-        drift[..., :joints] = gains[..., 2 * joints :, :]
-        idle = np.zeros((batch.size, len(self.plant.commands)))
-        observer = Observer(recorded, corrections, group, idle, drift=drift)
-        return self.simulator.follow(batch, inputs, self._first_states(batch), observer)
+        gains = filters[0].corrections[None] if len(filters) == 1 else np.stack([f.corrections for f in filters])
+        observer = Observer(self._measured, gains, group, np.zeros((batch.size, len(self.plant.commands))))
+        return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
 
     def filtered(self, model: Model, bandwidth: np.ndarray, places: Places) -> Filter:
         """The filter of a model, with what it needs to smooth at some places.
@@ -172,10 +166,10 @@ class Smoother:
 
     def _last_seen(self, places: Places) -> np.ndarray:
         """Last row that the state at each place may be estimated from, shape (W,)."""
-        found = np.zeros_like(places.rows)
+        found = np.zeros_like(places.starts)
         for r, last in enumerate(self._inputs.last):
             here, t = places.recordings == r, self._inputs.t[: last + 1, r]
-            found[here] = np.searchsorted(t, t[places.rows[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
+            found[here] = np.searchsorted(t, t[places.starts[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
         return found
 
     @cached_property

@@ -47,17 +47,19 @@ def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: 
     """Starts by each of B models, with a filter for each or one for all; these smooth at `leads_of` the windows."""
     until, first = start_rows(windows), windows.inputs.first
     found = smoother.following(batch, filters)
-    found = found.reshape(batch.size, -1, windows.count, found.shape[2])
-    place = np.clip(np.arange(until.max() + 1)[:, None] - first, 0, until - first)
-    states = found[:, place, np.arange(windows.count)]  # (B, rows, R, 2 joints)
+    found = found.reshape(batch.size, windows.count, -1, found.shape[2])
+    before = np.clip(until - np.arange(until.max() + 1)[:, None], 0, until - first)
+    states = found[:, np.arange(windows.count), before]  # (B, rows, R, 2 joints)
     return Starts(windows, until, np.ascontiguousarray(states.transpose(1, 3, 0, 2)))
 
 
 def leads_of(windows: Windows) -> Places:
-    """The rows from the first that is simulated to the start of each window: first ones of all windows, then second."""
+    """The rows from the start of each window back to the first that is simulated, window by window."""
     until, first = start_rows(windows), windows.inputs.first
-    rows = np.minimum(np.arange(np.max(until - first) + 1)[:, None], until - first) + first + windows.row
-    return Places(rows.ravel(), np.broadcast_to(windows.recording, rows.shape).ravel())
+    before = np.minimum(np.arange(np.max(until - first) + 1), (until - first)[:, None])  # (R, rows)
+    starts = np.broadcast_to((windows.row + until)[:, None], before.shape)
+    recordings = np.broadcast_to(windows.recording[:, None], before.shape)
+    return Places((starts - before).ravel(), recordings.ravel(), starts.ravel())
 
 
 def start_rows(windows: Windows) -> np.ndarray:

@@ -34,15 +34,13 @@ class Observer:
     """Corrects the state at every row by gains times recorded minus shown.
 
     Attributes:
-        recorded: Coordinates, then rates, shape (K + 1, 2 joints, R).
-        gains: Shape (groups, K + 1, R, 2 joints, 2 joints), from channels to states; zero where nothing
-            was measured.
+        recorded: Coordinates, then rates if they are seen, shape (K + 1, channels, R).
+        gains: Shape (groups, K + 1, R, states, channels), from channels to states; zero where nothing was measured.
+            States are coordinates, then rates, then accelerations that the observer adds to the model's, if it does.
         group: Which of the gains each model has, shape (P,).
         spread: Half width by which single commands scatter about the mean that the log has, shape (P, inputs)
             [N or N m]; thresholds of the actuator answer to single commands.
         reports: Whether to tell the forces of the drives.
-        drift: Gains of an acceleration on each joint that the observer adds to the model's,
-            shape (groups, K + 1, R, joints, 2 joints); None for none.
     """
 
     recorded: np.ndarray
@@ -50,7 +48,6 @@ class Observer:
     group: np.ndarray
     spread: np.ndarray
     reports: bool = False
-    drift: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -204,7 +201,7 @@ class _Run:
         self.coefficients.on[R.ON_RAMP] = ramps is not None
         ramps = self.layout.held() if ramps is None else ramps
         loop = loop or self.layout.open_loop()
-        measured, corrections, drift, group = self._observed(observer)
+        measured, corrections, group = self._observed(observer)
         led, until = self.layout.led(path)
         spread = np.zeros((self.layout.width, self.batch.size))
         if observer is not None:
@@ -233,7 +230,6 @@ class _Run:
                 observer is not None,
                 measured,
                 corrections,
-                drift,
                 group,
                 led,
                 until,
@@ -253,23 +249,21 @@ class _Run:
         with ThreadPoolExecutor(len(bounds) - 1) as pool:
             list(pool.map(work, bounds[:-1], bounds[1:]))
 
-    def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Recorded signals, both kinds of gains and groups in the kernel's layout."""
-        width, pattern = self.layout.width, self.layout.pattern
-        none = np.zeros((1, 1, 1, width, 2 * width))
+    def _observed(self, observer: Observer | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Recorded signals, gains and groups in the kernel's layout."""
+        width, group = self.layout.width, np.zeros(1, dtype=np.int64)
         if observer is None:
-            rows = np.zeros((1, 2 * width, 1))
-            return rows, np.zeros((1, 1, 1, 2 * width, 2 * width)), none, np.zeros(1, dtype=np.int64)
-        measured = np.zeros((self.layout.rows + 1, 2 * width, self.inputs.windows))
-        measured[:, pattern] = observer.recorded
-        gains, drift = observer.gains, none
-        if len(pattern) < 2 * width:
-            gains = np.zeros((*observer.gains.shape[:3], 2 * width, 2 * width))
-            gains[..., np.array(pattern)[:, None], pattern] = observer.gains
-        if observer.drift is not None:
-            drift = np.zeros((*observer.drift.shape[:3], width, 2 * width))
-            drift[..., np.array(pattern[: len(pattern) // 2])[:, None], pattern] = observer.drift
-        return measured, gains, drift, observer.group.astype(np.int64)
+            return np.zeros((1, width, 1)), np.zeros((1, 1, 1, 2 * width, width)), group
+        recorded, gains, group = observer.recorded, observer.gains, observer.group.astype(np.int64)
+        kinds = [count // len(self.batch.model.plant.joints) for count in gains.shape[3:]]
+        states, channels = (self.layout.places(kind) for kind in kinds)
+        if len(channels) == kinds[1] * width:
+            return np.ascontiguousarray(recorded), np.ascontiguousarray(gains), group
+        seen = np.zeros((len(recorded), kinds[1] * width, self.inputs.windows))
+        seen[:, channels] = recorded
+        corrections = np.zeros((*gains.shape[:3], *(kind * width for kind in kinds)))
+        corrections[..., np.array(states)[:, None], channels] = gains
+        return seen, corrections, group
 
     def _shares(self, first_row: int, last_row: int) -> list[int]:
         """Lane bounds of the threads, in whole vectors."""

@@ -199,7 +199,6 @@ def rollout(
     follows,
     measured,
     observer,
-    drift,
     group,
     path,
     until,
@@ -233,9 +232,8 @@ def rollout(
         noise: Measurement noise of the loop, shape (K, 2 N, lanes); closed loop only.
         settings: Time constant of the rate filter [s] (negative: rates are measured), limit of the command.
         follows: Whether an observer corrects the state at every row.
-        measured: What it sees, shape (K + 1, 2 N, R).
-        observer: Its gains, shape (groups, K + 1, R, 2 N, 2 N).
-        drift: Its gains of an acceleration on each joint, shape (groups, K + 1, R, N, 2 N); else (1, 1, 1, N, 2 N).
+        measured: What it sees, shape (K + 1, N or 2 N, R).
+        observer: Its gains, shape (groups, K + 1, R, 2 N or 3 N, N or 2 N).
         group: Which of them each model has, shape (P,).
         path: True coordinates and rates to which the state is put, shape (rows, 2 N, lanes), or R for all models.
         until: Last row at which it is, shape (R,); -1 for never.
@@ -277,7 +275,7 @@ def rollout(
             if follows:
                 for w in range(count):
                     counts[w] = substeps[k, lanes[0, w]]
-                correct(B, on, past, t_rows, lanes, k, lane0, count, measured, observer, drift, group, counts)
+                correct(B, on, past, t_rows, lanes, k, lane0, count, measured, observer, group, counts)
             if closed:
                 feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:
@@ -287,7 +285,7 @@ def rollout(
                 if s == 0 or s >= least:
                     set_step(S, B, n, has, counts, s)
                 step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
-                if drift.shape[1] > 1:
+                if observer.shape[3] > 2 * joints:
                     pushed(B, joints, n)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)

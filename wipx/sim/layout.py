@@ -66,11 +66,15 @@ class Layout:
         indices = [joint_index(self.plant, site) for site in self.plant.joints]
         return slice(indices[0], indices[-1] + 1)
 
+    def places(self, kinds: int) -> list[int]:
+        """Of the plant's joints in rows of several kinds, each of which has N: coordinates, rates, ..."""
+        indices = [joint_index(self.plant, site) for site in self.plant.joints]
+        return [kind * self.width + joint for kind in range(kinds) for joint in indices]
+
     @property
     def pattern(self) -> list[int]:
         """The plant's coordinates, then rates, among 2 N."""
-        indices = [joint_index(self.plant, site) for site in self.plant.joints]
-        return [*indices, *(self.width + j for j in indices)]
+        return self.places(2)
 
     @property
     def driven(self) -> list[int]:

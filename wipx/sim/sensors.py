@@ -90,38 +90,43 @@ def feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, no
 
 
 @law
-def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, drift, group, counts):
+def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, group, counts):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
-    `measured` has coordinates and rates of N joints, shape (K + 1, 2 N, R); `gains` the shape (groups, K + 1, R, 2 N
-    states, 2 N channels), zero where nothing was measured; `group` says which of them each model has. `drift` has the
-    gains of an acceleration that acts on each joint besides, shape (groups, K + 1, R, N, 2 N), or (1, 1, 1, N, 2 N)
-    without one.
+    `measured` has the coordinates of N joints, and maybe their rates, shape (K + 1, channels, R). `gains` has the shape
+    (groups, K + 1, R, states, channels), zero where nothing was measured; the states are coordinates, rates, and maybe
+    an acceleration that acts on each joint besides. `group` says which of the gains each model has.
     """
-    windows, joints = measured.shape[2], measured.shape[1] // 2
-    drifts = drift.shape[1] > 1
+    windows, joints = measured.shape[2], len(B)
+    sees_rates, pushes = measured.shape[1] > joints, gains.shape[3] > 2 * joints
     for w in range(count):
         window = lanes[0, w]
         gain = gains[group[(lane0 + w) // windows], k, window]
         for i in range(joints):
             J = B[i]
             J[R.NEXT * W + w] = measured[k, i, window] - J[R.SHOWN * W + w]
-            J[R.RIGHT * W + w] = measured[k, joints + i, window] - J[R.V * W + w]
+            if sees_rates:
+                J[R.RIGHT * W + w] = measured[k, joints + i, window] - J[R.V * W + w]
         for j in range(joints):
             J = B[j]
             way, rate, extra = 0.0, 0.0, 0.0
             for i in range(joints):
-                place, speed = B[i, R.NEXT * W + w], B[i, R.RIGHT * W + w]
-                way += gain[j, i] * place + gain[j, joints + i] * speed
-                rate += gain[joints + j, i] * place + gain[joints + j, joints + i] * speed
-                if drifts and counts[w] > 0:
-                    own = drift[group[(lane0 + w) // windows], k, window]
-                    extra += own[j, i] * place + own[j, joints + i] * speed
+                place = B[i, R.NEXT * W + w]
+                way += gain[j, i] * place
+                rate += gain[joints + j, i] * place
+                if pushes:
+                    extra += gain[2 * joints + j, i] * place
+                if sees_rates:
+                    speed = B[i, R.RIGHT * W + w]
+                    way += gain[j, joints + i] * speed
+                    rate += gain[joints + j, joints + i] * speed
+                    if pushes:
+                        extra += gain[2 * joints + j, joints + i] * speed
             J[R.Q * W + w] += way
             J[R.V * W + w] += rate
             if on[R.ON_SENSOR_DELAY]:
                 correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, J[R.SENSOR_DELAY * W + w])
-            if drifts and counts[w] > 0:
+            if pushes and counts[w] > 0:
                 J[R.EXTRA * W + w] += extra
 
 
