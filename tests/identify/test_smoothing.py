@@ -69,6 +69,33 @@ def test_models_that_are_followed_together_have_the_states_of_each_alone(fresh_s
     assert not np.allclose(together[:, :, 0], together[:, :, 1])
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_states_that_lead_to_a_start_use_what_it_may_see_and_nothing_later(kind: str, fresh_seed: int):
+    model, recording = nominal_model(kind), recorded(kind, {}, fresh_seed)[0]
+    noise = sensor_noise((recording,), model.plant)
+    bandwidth = np.full(len(noise), 10.0)
+
+    def led(one: Recording):
+        smoother = Smoother(SIMULATOR, model.plant, (one,), noise)
+        windows = cut((one,), model.plant, horizon=0.5, lead=0.1)
+        starts = starts_by(
+            smoother, windows, ModelBatch(model), [smoother.filtered(model, bandwidth, leads_of(windows))]
+        )
+        return windows, starts, smoother.along(model, bandwidth)[..., 0]
+
+    windows, starts, along = led(recording)
+    until = starts.until[0]
+    begun = starts.states[until, :, 0, 0]
+    np.testing.assert_allclose(begun, along[windows.row[0] + until], rtol=1e-9, atol=1e-12)
+    seen = int(np.searchsorted(recording.t, windows.starts[0] + LOOK_AHEAD + 1e-6, side="right"))
+    moved = {name: np.where(np.arange(len(recording)) < seen, x, 1.1 * x) for name, x in recording.columns.items()}
+    later = led(replace(recording, columns=moved | {"t": recording.t}))[1]
+    np.testing.assert_allclose(later.states[:, :, 0, 0], starts.states[:, :, 0, 0], rtol=1e-9, atol=1e-12)
+    moved = {name: np.where(np.arange(len(recording)) < seen - 1, x, 1.1 * x) for name, x in recording.columns.items()}
+    earlier = led(replace(recording, columns=moved | {"t": recording.t}))[1]
+    assert not np.allclose(earlier.states[until - 5, :, 0, 0], starts.states[until - 5, :, 0, 0], rtol=1e-9, atol=1e-12)
+
+
 def test_a_constant_acceleration_that_the_model_lacks_is_found(fresh_seed: int):
     force = 2.0
     recordings = recorded("linear_axis", {"actuator/offset": {"F_0": force}}, fresh_seed)
