@@ -59,7 +59,7 @@ def nats(value: float) -> str:
     """A log-likelihood with the digits that matter: no more than one decimal; a dash where there is none."""
     if not math.isfinite(value):
         return MISSING
-    return f"{value:.0f}" if abs(value) >= 99.95 else f"{value + 0.0:.1f}"
+    return f"{value:.0f}" if abs(value) >= 99.95 else f"{round(value, 1) + 0.0:.1f}"
 
 
 def p_value(value: float) -> str:
