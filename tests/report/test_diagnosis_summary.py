@@ -60,4 +60,4 @@ def test_probabilities_never_claim_certainty():
 
 def test_shares_and_nats_keep_the_digits_that_matter():
     assert [percent(share) for share in (0.0, 0.061, 0.812, -0.03)] == ["0 %", "6.1 %", "81 %", "-3.0 %"]
-    assert [nats(gain) for gain in (412.3, 38.0, 0.2, float("nan"))] == ["412", "38.0", "0.2", "-"]
+    assert [nats(gain) for gain in (412.3, 38.0, 0.2, -0.04, float("nan"))] == ["412", "38.0", "0.2", "0.0", "-"]

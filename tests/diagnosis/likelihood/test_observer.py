@@ -203,7 +203,7 @@ def plain_filter(
         heard = variance + (BEFORE * np.array(unseen)) ** 2
         s = h @ p @ h.T + np.diag(heard)
         gain = p @ h.T @ np.linalg.inv(s)
-        gains.append(np.zeros_like(first))
+        gains.append(np.zeros((2 * joints, data.seen)))
         gains[-1][:, data.channels] = gain
         whitening.append(np.linalg.inv(np.linalg.cholesky(s)))
         dt = float(data.intervals[k, r]) if k < data.inputs.last[r] else 0.0

@@ -104,7 +104,7 @@ class InnovationsModel:
             self.data.inputs,
             start,
             Observer(
-                self.data.measured,
+                self.data.measured[:, : self.data.seen],
                 corrections,
                 group,
                 np.outer(spread, self.data.command_spread),

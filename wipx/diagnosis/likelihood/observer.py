@@ -41,7 +41,7 @@ class Gains:
     """Gains and innovation covariances of one set of noise levels.
 
     Attributes:
-        gains: Shape (K + 1, R, 2 joints, 2 joints), from channels to states.
+        gains: Shape (K + 1, R, 2 joints, channels), from coordinates, and rates where any is recorded, to states.
         whitening: Inverse Cholesky factor of the innovations' covariance, shape (K + 1, R, m, m).
     """
 
@@ -67,7 +67,7 @@ def observer_gains(
     """
     late = np.zeros(data.joints) if delays is None else np.array(delays)
     n, m = 2 * data.joints, len(data.channels)
-    gains = np.zeros((len(levels), *data.rows.shape, n, n))
+    gains = np.zeros((len(levels), *data.rows.shape, n, data.seen))
     whitening = np.zeros((len(levels), *data.rows.shape, m, m))
     _riccati(
         linear.a,
@@ -216,7 +216,7 @@ def _hear(sensor, time, delay, noise):
 
 @cached
 def _store(gain, inverse, channels, exists, gains, whitening):
-    """Write gains (L, R, n, n) and whitening (L, R, m, m) of one row, where a recording has it."""
+    """Write gains (L, R, n, channels) and whitening (L, R, m, m) of one row, where a recording has it."""
     levels, recordings, n, _ = gains.shape
     for level in range(levels):
         for r in range(recordings):
@@ -231,7 +231,7 @@ def _store(gain, inverse, channels, exists, gains, whitening):
 
 @cached
 def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, jolts, gains, whitening):
-    """Fill in gains (L, K + 1, R, n, n) and whitening (L, K + 1, R, m, m) of L noise levels.
+    """Fill in gains (L, K + 1, R, n, channels) and whitening (L, K + 1, R, m, m) of L noise levels.
 
     A lane is one level on one recording, lane = level R + recording; the innermost loops run along the lanes.
     """

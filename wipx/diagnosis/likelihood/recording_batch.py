@@ -75,6 +75,11 @@ class RecordingBatch:
         return tuple(tuple(np.flatnonzero(self.channels % self.joints == j).tolist()) for j in range(self.joints))
 
     @property
+    def seen(self) -> int:
+        """Number of columns of `measured` up to the last kind that is recorded: coordinates, or rates too."""
+        return self.joints if self.channels.max() < self.joints else 2 * self.joints
+
+    @property
     def signals(self) -> int:
         """Number m of signals whose errors are weighed: the channels, then the reported forces."""
         return len(self.channels) + self.reported.shape[1]
