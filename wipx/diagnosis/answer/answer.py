@@ -125,7 +125,7 @@ def _effects(
         again = repeated if own is rest.fit else transfer(part.store.fitter, own)
         return _effects_of_part(context.beside(part), part, replace(rest, fit=own), again, ends, shapes)
 
-    parts = context.fitter.simulator.side_by_side(told, search.split(rest.fit))
+    parts = context.fitter.simulator.side_by_side(told, search.split(rest.fit, with_stand_ins=True))
     found = sorted((effect for part in parts for effect in part), key=lambda effect: -effect.log_evidence_gain)
     named = [effect for effect in found if effect.name not in rest.minor]
     total = sum(effect.log_evidence_gain for effect in named) or 1.0
@@ -276,7 +276,7 @@ def proposed(
     tied = {effect.name: effect.equivalent for effect in answer.effects}
     rivals = [
         part.store.fitter.seen_by_row(other)[1]
-        for part, own in search.split(fit)
+        for part, own in search.split(fit, with_stand_ins=True)
         for effect in own.effects
         for name in tied.get(effect, ())
         for other in part.store.replacements(own, effect)

@@ -7,7 +7,7 @@ first moment, beside any change of mass and of second moments; several masses wi
 
 import numpy as np
 
-from wipx.core.model import ModelBatch
+from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.effects.catalogue import effect_of
@@ -29,12 +29,11 @@ def point_masses(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, name: st
     """
     model = fit.hypothesis.model
     effect = effect_of(name, model.plant)
-    small = SMALL * model.parameters[f"{name.partition('/')[0].removeprefix('link_')}.mass"]
-    places = ARM * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    probes = np.column_stack([np.full(len(places), small), places])
+    tried = probes(model, name)
+    small = tried[0, 0]
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
     base = fit.white.ravel()
-    change = fitter.white_of(fit, ModelBatch(model.with_effects({name: effect.neutral}), names, probes)) - base
+    change = fitter.white_of(fit, ModelBatch(model.with_effects({name: effect.neutral}), names, tried)) - base
     middle, ahead, behind = change[:1], change[1:4], change[4:]
     columns = np.concatenate([middle, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - middle])
     columns -= (columns @ basis) @ basis.T
@@ -42,6 +41,13 @@ def point_masses(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, name: st
     moment = amounts[1:4] * small * ARM
     masses = masses_with(moment, float(amounts[0] * small))
     return np.column_stack([masses, moment / np.maximum(masses[:, None], 1e-300)])
+
+
+def probes(model: Model, name: str) -> np.ndarray:
+    """Small masses [kg] in the origin of a link and ahead of and behind it on each axis [m], shape (7, 4)."""
+    small = SMALL * model.parameters[f"{name.partition('/')[0].removeprefix('link_')}.mass"]
+    places = ARM * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    return np.column_stack([np.full(len(places), small), places])
 
 
 def masses_with(moment: np.ndarray, mass: float) -> np.ndarray:

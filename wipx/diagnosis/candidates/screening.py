@@ -4,7 +4,7 @@ A score test (Rao 1948): the change that a small dose of an effect makes in the 
 freed of what the numbers already in the model can imitate, is compared with the innovations themselves.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -70,14 +70,19 @@ def candidates_beside(
         fit: What is already explained.
         outside_vocabulary: Whether to look at the effects that contract section 3 lacks instead of those it has.
     """
+    names = names_beside(fitter, setting, fit, outside_vocabulary=outside_vocabulary)
+    found = [each for name in names for each in candidates_of_effect(fitter, setting, fit, name)]
+    return sorted(found, key=lambda candidate: -candidate.gain)
+
+
+def names_beside(fitter: Fitter, setting: Setting, fit: Fit, *, outside_vocabulary: bool = False) -> Iterator[str]:
+    """The effects that could be added to a fit, see `candidates_beside`."""
     known = vocabulary(setting.nominal.plant)
     present = set(fit.hypothesis.model.effects)
-    found: list[Candidate] = []
     for name, effect in known.items():
         wanted = fitter.looks_for(name, effect) != outside_vocabulary and not effect.tolerance
         if wanted and setting.looks_at(name) and not _excluded(name, effect, present, known):
-            found += candidates_of_effect(fitter, setting, fit, name)
-    return sorted(found, key=lambda candidate: -candidate.gain)
+            yield name
 
 
 def _excluded(name: str, effect: Effect, present: set[str], known: Mapping[str, Effect]) -> bool:

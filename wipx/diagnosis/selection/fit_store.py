@@ -3,6 +3,7 @@
 What is preferred is decided elsewhere (`criteria`, `search`).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,11 +31,13 @@ class FitStore:
         fitter: Fits hypotheses.
         setting: The robot.
         nominal: The fit without any effect.
+        elsewhere: Effects at other sites that may take the place of an effect, by that effect.
     """
 
     fitter: Fitter
     setting: Setting
     nominal: Fit
+    elsewhere: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     _fits: dict[frozenset[str], Fit] = field(default_factory=dict)
     _extensions: dict[frozenset[str], list[Fit]] = field(default_factory=dict)
     _candidates: dict[int, tuple[Fit, list[Candidate]]] = field(default_factory=dict)
@@ -42,7 +45,7 @@ class FitStore:
     @classmethod
     def of(cls, fitter: Fitter, setting: Setting, nominal: Fit) -> "FitStore":
         """A store that holds the fit of the nominal model."""
-        return cls(fitter, setting, nominal, {frozenset(nominal.effects): nominal})
+        return cls(fitter, setting, nominal, _fits={frozenset(nominal.effects): nominal})
 
     @property
     def is_of_part(self) -> bool:
@@ -110,7 +113,17 @@ class FitStore:
 
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
         """Fits with another effect in the place of one, the best first."""
-        return self.extensions(self.without(fit, effect))
+        base = self.without(fit, effect)
+        others = [self._with_one_from_elsewhere(base, name) for name in self.elsewhere.get(effect, ())]
+        found = [*self.extensions(base), *(fit for fit in others if fit is not base)]
+        return sorted(found, key=lambda fit: -score(fit, base))
+
+    def _with_one_from_elsewhere(self, base: Fit, name: str) -> Fit:
+        """A fit with an effect at another site; the same fit where there is nothing for it to explain."""
+        key = frozenset((*base.effects, name))
+        if key not in self._fits:
+            self._fits[key] = self._started(base, name) or base
+        return self._fits[key]
 
     def refitted_from(self, fit: Fit, larger: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of a larger fit.
@@ -159,9 +172,12 @@ class FitStore:
 
     def _restarted_without(self, fit: Fit, effect: str) -> Fit:
         """A fit of the same effects, for which one of them starts from where the others leave it room."""
-        base = self.without(fit, effect)
+        return self._started(self.without(fit, effect), effect) or fit
+
+    def _started(self, base: Fit, effect: str) -> Fit | None:
+        """A fit with one effect more that starts from where the others leave it room; None where they leave none."""
         starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
-        return self.fitter.converged(self._best_start(base, starts[:LOOKED_AT])) if starts else fit
+        return self.fitter.converged(self._best_start(base, starts[:LOOKED_AT])) if starts else None
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.candidates_for(fit)

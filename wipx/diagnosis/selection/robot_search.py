@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from wipx.core.plant import Plant
+from wipx.diagnosis.candidates.stand_ins import stand_ins
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
@@ -75,9 +76,8 @@ class Held:
     def with_part(self, sites: frozenset[str], fit: Fit) -> "Held":
         """The same with what a fit has found at the sites of a part."""
         others = tuple(effect for effect in self.effects if _site(effect) not in sites)
-        return replace(
-            self, effects=(*others, *fit.effects), values={**self.values, **fit.hypothesis.values}, levels=fit.levels
-        )
+        effects = tuple(dict.fromkeys((*others, *fit.effects)))
+        return replace(self, effects=effects, values={**self.values, **fit.hypothesis.values}, levels=fit.levels)
 
 
 def _site(effect: str) -> str:
@@ -116,6 +116,9 @@ class RobotSearch(Search):
     _known: dict[tuple[int, frozenset[str]], tuple[Fit, FitStore, Fit]] = field(
         default_factory=dict, compare=False, repr=False
     )
+    _elsewhere: dict[int, tuple[Fit, Mapping[str, tuple[str, ...]]]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     @classmethod
     def of(cls, store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> "RobotSearch":
@@ -124,7 +127,7 @@ class RobotSearch(Search):
 
     def knowing(self, tolerances: Mapping[str, Mapping[str, float]]) -> "RobotSearch":
         """The same with laws that every machine follows a little."""
-        return replace(super().knowing(tolerances), _known={})
+        return replace(super().knowing(tolerances), _known={}, _elsewhere={})
 
     @property
     def plant(self) -> Plant:
@@ -135,7 +138,7 @@ class RobotSearch(Search):
         """The fit of the effects that are missing; `nominal` where none is."""
         whole = self._finished(self.grown(begin))
         for _ in range(self.store.fitter.exchanges):
-            found = self._found_by_parts(whole.fit, self._parts_with_effects(whole.fit), self._exchanged_in)
+            found = self._exchanged_by_parts(whole.fit)
             other = Chosen(self._with_parts(whole.fit, found), _considered(found))
             fewer = len(other.fit.effects) < len(whole.fit.effects)
             least = -self.rules.least_gain if fewer else 0.0
@@ -180,9 +183,11 @@ class RobotSearch(Search):
             return Chosen(own)
         return self._search_in(store, own).grown(own, steps=1)
 
-    def _exchanged_in(self, store: FitStore, own: Fit) -> Chosen:
-        """A part with better effects in the place of its own."""
-        return self._search_in(store, own).exchanged(own)
+    def _exchanged_by_parts(self, whole: Fit) -> dict[frozenset[str], Chosen]:
+        """What the parts that have effects become with better ones in their place."""
+        parts = self.split(whole, with_stand_ins=True)
+        found = self.store.fitter.simulator.side_by_side(lambda part: part[0].exchanged(part[1]), parts)
+        return dict(zip(self._parts_with_effects(whole), found, strict=True))
 
     def _found_by_parts(
         self, whole: Fit, parts: Sequence[frozenset[str]], change: Callable[[FitStore, Fit], Chosen]
@@ -234,12 +239,20 @@ class RobotSearch(Search):
                 return self.pruned(smaller).after((considered,))
         return Chosen(fit)
 
-    def split(self, fit: Fit) -> tuple[tuple[Search, Fit], ...]:
+    def split(self, fit: Fit, *, with_stand_ins: bool = False) -> tuple[tuple[Search, Fit], ...]:
         """The searches of the parts that have effects, and the fit as each of them sees it."""
+        elsewhere = self._stand_ins(fit) if with_stand_ins else {}
         parts = self.store.fitter.simulator.side_by_side(
             lambda sites: self._part(fit, sites), self._parts_with_effects(fit)
         )
-        return tuple((self._search_in(store, own), own) for store, own in parts)
+        return tuple((self._search_in(replace(store, elsewhere=elsewhere), own), own) for store, own in parts)
+
+    def _stand_ins(self, fit: Fit) -> Mapping[str, tuple[str, ...]]:
+        """Effects of other parts that may take the place of one, by that effect."""
+        if id(fit) not in self._elsewhere:
+            found = stand_ins(self.store.fitter, self.store.setting, fit, parts_of(self.plant))
+            self._elsewhere[id(fit)] = (fit, found)
+        return self._elsewhere[id(fit)][1]
 
     def _parts_with_effects(self, fit: Fit) -> list[frozenset[str]]:
         return [sites for sites in parts_of(self.plant) if _effects_at(fit, sites)]

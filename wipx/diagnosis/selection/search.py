@@ -133,8 +133,13 @@ class Search:
             current = pruned.fit
         return Chosen(current, considered)
 
-    def split(self, fit: Fit) -> "tuple[tuple[Search, Fit], ...]":
-        """The searches by which a robot is searched part by part, and the fit as each sees it: itself."""
+    def split(self, fit: Fit, *, with_stand_ins: bool = False) -> "tuple[tuple[Search, Fit], ...]":
+        """The searches by which a robot is searched part by part, and the fit as each sees it: itself.
+
+        Args:
+            fit: Of the whole robot.
+            with_stand_ins: Whether effects of other parts may take the place of those of a part.
+        """
         return ((self, fit),)
 
     def joined(self, fit: Fit, parts: tuple[Fit, ...]) -> Fit:
@@ -183,7 +188,7 @@ class Search:
             best, most = fit, self.rules.least_lead
             for effect in fit.effects:
                 base = self.store.without(fit, effect)
-                found = self.preferred(self.store.extensions(base), base)
+                found = self.preferred(self.store.replacements(fit, effect), base)
                 lead = most if found is None else self.criteria.lead(found, fit)
                 if found is not None and lead > most and self.criteria.gains_enough(base, found):
                     best, most = found, lead
