@@ -14,6 +14,7 @@ from wipx.core.results import Estimate, FitErrors, Trace
 from wipx.diagnosis.answer.combined_laws import combined
 from wipx.diagnosis.answer.law_curves import law_curve
 from wipx.diagnosis.answer.location import located
+from wipx.diagnosis.candidates.stand_ins import CLOSE_SHARE
 from wipx.diagnosis.decision.confirmation import Rest
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import bounds, estimates, is_wide
@@ -33,8 +34,6 @@ from wipx.effects.catalogue import effect_of
 from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.diagnosis_sentence import sentence
 from wipx.sim.simulator import StateFeedback
-
-CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is fitted to the end in any case
 
 
 def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) -> Diagnosis:

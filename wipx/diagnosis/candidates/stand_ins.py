@@ -16,7 +16,7 @@ from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Setting
 from wipx.effects.catalogue import effect_of
 
-LIKE = 0.9  # of what a fit loses without an effect, which another one must regain to be worth a fit
+CLOSE_SHARE = 0.1  # of what an effect gains, within which a rival is worth a fit to the end
 DEPENDENT = 1e-9  # relative size below which a response adds no direction to others
 
 
@@ -47,7 +47,7 @@ def stand_ins(
         for effect in fit.effects:
             if _site(effect) not in part:
                 lost, regained = swap(fit, effect, slopes, shared, own)
-                if regained > LIKE * lost:
+                if lost - regained < CLOSE_SHARE * lost:
                     found[effect].append(name)
     return {effect: tuple(names) for effect, names in found.items()}
 

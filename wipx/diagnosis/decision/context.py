@@ -119,17 +119,17 @@ class Context:
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors, also what lasts of it, which innovations show. Random forces
-        excuse nothing: they leave innovations white.
+        The worst is first. Noise is that of the sensors. What lasts of it makes innovations as much larger as earlier
+        ones foretell them. Random forces excuse nothing: they leave innovations white.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
-        errors = self.errors(fit)
+        errors, foretold = self.errors(fit), by_row.foretold(seen)
         floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
-        noise = np.hypot(floor, by_row.innovation_sizes(seen))
+        noise = floor / np.sqrt(np.clip(1.0 - foretold, 1e-12, 1.0))
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
         rules = self.rules.trust  # noise that lasts puts a right model far off where motion is unstable, not beyond
-        wrong = (times > rules.far_off * rules.distrusted) & (by_row.foretold(seen) > rules.foretold)
+        wrong = (times > rules.far_off * rules.distrusted) & (foretold > rules.foretold)
         return tuple(plant.joints[j] for j in np.argsort(-times) if wrong[j])
 
     def is_worse(self, fit: Fit) -> bool:

@@ -108,8 +108,10 @@ def _by_forecasts_and_forces(context: Context, chosen: Fit, watcher: Watcher, *,
 
 
 def _better(by_row: Found, fitter: ForecastFitter, ahead: Found, agrees: bool) -> Found:
-    """The answer of innovations or that of forecasts."""
+    """The answer of innovations or that of forecasts; always that of forecasts if the other does harm."""
     rest = by_row.rest
+    if by_row.context.is_worse(rest.fit):
+        return ahead
     if rest.significant:
         if _is_far_likelier(fitter, rest, ahead.rest.fit):
             return by_row

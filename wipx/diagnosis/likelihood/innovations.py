@@ -38,6 +38,7 @@ class InnovationFitter(Fitter):
     Attributes:
         innovations_model: Of the recordings.
         rules: What decides.
+        joints: Whose noise is searched for; empty for that of all joints.
     """
 
     considered = 6
@@ -47,6 +48,7 @@ class InnovationFitter(Fitter):
 
     innovations_model: InnovationsModel
     rules: Rules = USUAL
+    joints: tuple[int, ...] = ()
 
     @property
     def own_rules(self) -> EvidenceRules:
@@ -93,8 +95,9 @@ class InnovationFitter(Fitter):
         return replace(self, innovations_model=replace(self.innovations_model, data=data))
 
     def beside(self, setting: Setting) -> "InnovationFitter":
-        """Itself."""
-        return self
+        """The same for one part of a robot: noise is searched for on its joint; on all joints if it has none."""
+        own = (j for j, joint in enumerate(self.data.plant.joints) if setting.sites and joint in setting.sites)
+        return replace(self, joints=tuple(own))
 
     def required_beyond_penalty(self, smaller: Fit, larger: Fit, explained: float) -> float:
         """So much that no search over many effects finds it by chance, and a share of what is explained."""
@@ -139,13 +142,6 @@ class InnovationFitter(Fitter):
         rows = self.data.counted.T[:, None]
         left = 1.0 / np.diag(fit.noise.whitening)[channels] ** 2
         return 1.0 - left * rows.sum() / np.maximum(np.sum(errors**2 * rows, axis=(0, 2)), 1e-300)
-
-    def innovation_sizes(self, fit: Fit) -> np.ndarray:
-        """Root mean square of each coordinate's innovations, shape (joints,) [m or rad]."""
-        observer, model, joints = self.innovations_model, fit.hypothesis.model, self.data.joints
-        expected = observer.estimated(model, observer.gains(fit.levels, model), fit.levels.spread)[:, :joints]
-        squares = (self.data.measured[:, :joints] - expected) ** 2 * self.data.counted[:, None]
-        return np.sqrt(squares.sum(axis=(0, 2)) / max(int(self.data.counted.sum()), 1))
 
     def escape_levels(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
@@ -218,6 +214,8 @@ class InnovationFitter(Fitter):
                     moves.append(move)
                 trials = [np.clip(best + each, centre - LEVEL_RANGE, centre + LEVEL_RANGE) for each in moves]
                 likelihoods = search.likelihoods([best, *trials])
+                if len(free) == 1:
+                    likelihoods = likelihoods.sum(axis=1, keepdims=True)
                 gains = likelihoods[1:] - likelihoods[0]
                 move = _joined(gains, moves, free)
                 there = search.likelier([_best_of_each(gains, trials, best, free)], best)
@@ -232,9 +230,11 @@ class InnovationFitter(Fitter):
     def _free_levels(self) -> tuple[tuple[int, ...], ...]:
         """Which levels are searched for each group of channels: all of its joints and channels but the first sensor."""
         data, joints = self.data, self.data.joints
+        forces = [[int(data.channels[c]) for c in group if data.channels[c] < joints] for group in data.groups]
         return tuple(
-            (*(int(data.channels[c]) for c in group if data.channels[c] < joints), *(joints + c for c in group[1:]))
-            for group in data.groups
+            (*own, *(joints + c for c in group[1:]))
+            for own, group in zip(forces, data.groups, strict=True)
+            if not self.joints or set(own) & set(self.joints)
         )
 
     def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
