@@ -46,19 +46,16 @@ class EvidenceRules:
         promising: Share of the best expected gain.
         worthless: Expected gain [nats].
         unproven: Number of effects.
-        richer_by: Lead [nats].
     """
 
     promising: float
     worthless: float
     unproven: int
-    richer_by: float
 
 
 PROMISING = "share of the best expected gain below which an effect is not fitted"
 WORTHLESS = "expected gain below which an effect is not fitted"
 UNPROVEN = "effects that need not transfer to held-out recordings, at most"
-RICHER_BY = "lead that a rich law must have over the simple one that it contains"
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,6 @@ class InnovationRules(EvidenceRules):
     promising: float = rule(0.05, "", PROMISING, DEVELOPING, 0.0)
     worthless: float = rule(3.0, "nats", WORTHLESS, "derived: less than the penalty of one number", 0.0)
     unproven: int = rule(4, "effects", UNPROVEN, f"{REAL}: small effects fill up what stays unexplained", 99)
-    richer_by: float = rule(4.0, "nats", RICHER_BY, DEVELOPING, 0.0)
 
 
 @dataclass(frozen=True)
@@ -78,7 +74,6 @@ class ForecastRules(EvidenceRules):
     promising: float = rule(0.0, "", PROMISING, "every effect is fitted", 0.0)
     worthless: float = rule(-UNLIMITED, "nats", WORTHLESS, "every effect is fitted", -UNLIMITED)
     unproven: int = rule(0, "effects", UNPROVEN, f"{REAL}: no effect is taken on trust where no law holds", 99)
-    richer_by: float = rule(8.0, "nats", RICHER_BY, DEVELOPING, 0.0)
     level: float = rule(
         0.1,
         "probability",

@@ -69,6 +69,14 @@ class Criteria:
         """By how much a fit is better than another one, as the kind of evidence judges it [nats]."""
         return self.fitter.lead(fit, other, self.score_lead(fit, other))
 
+    def tells_apart(self, rich: Fit, plain: Fit) -> bool:
+        """Whether recordings tell a rich law from the simple one that it contains, each that of a fit."""
+        own = [
+            i for effect in rich.effects if effect not in plain.effects for i in rich.hypothesis.parameters_of(effect)
+        ]
+        apart = self.fitter.separation(rich, plain, evidence(plain, rich), inflation(rich, own))
+        return self.score_lead(rich, plain) > 0.0 and apart >= self.fitter.rules.answer.told_apart
+
     def tolerance(self, best: Fit, simple: tuple[str, ...]) -> float:
         """By how much a fit may be better than one in which a simple law has a rich one's place [nats]."""
         rests = any(comes_to_rest(effect) for effect in best.effects if effect not in simple)

@@ -161,7 +161,7 @@ class Search:
             replaced = reduced_effects(best, fitter.data)
         for effect in best.effects:
             plain = self.store.with_reduced_law(best, effect)
-            if plain is not None and score(best, base) - score(plain, base) < fitter.own_rules.richer_by:
+            if plain is not None and not self.criteria.tells_apart(best, plain):
                 return plain
         parts = effects_in_parts(best, fitter.data)
         if parts is not None:
