@@ -145,7 +145,10 @@ class InnovationFitter(Fitter):
 
     def escape_levels(self, fit: Fit) -> NoiseLevels:
         """Forces that explain a misfit make it hard to leave: louder ones make the likelihood smoother."""
-        return replace(fit.levels, force=LOUDER * fit.levels.force)
+        joints = list(self.joints) or slice(None)
+        force = fit.levels.force.copy()
+        force[joints] *= LOUDER
+        return replace(fit.levels, force=force)
 
     def seen_by_row(self, fit: Fit) -> "tuple[InnovationFitter, Fit]":
         """The fit itself."""
