@@ -68,7 +68,8 @@ def swap(fit: Fit, effect: str, slopes: np.ndarray, shared: np.ndarray, own: np.
     names = fit.hypothesis.space.names
     grows = [i for i in numbers if names[i].rpartition(".")[2] in law.linear_in] or numbers
     others = [i for i in range(len(names)) if i not in numbers and fit.free[i]]
-    beside = np.linalg.qr(slopes[:, others])[0]
+    directions, sizes, _ = np.linalg.svd(slopes[:, others], full_matrices=False)
+    beside = directions[:, sizes > DEPENDENT * sizes.max(initial=0.0)]
     gone = slopes[:, grows] @ (fit.hypothesis.cube - fit.hypothesis.space.neutral)[grows]
     gone = gone - beside @ (beside.T @ gone)
     shared = shared - (shared @ beside) @ beside.T

@@ -115,15 +115,13 @@ class FitStore:
         """Fits with another effect in the place of one, the best first."""
         base = self.without(fit, effect)
         others = [self._with_one_from_elsewhere(base, name) for name in self.elsewhere.get(effect, ())]
-        found = [*self.extensions(base), *(fit for fit in others if fit is not base)]
-        return sorted(found, key=lambda fit: -score(fit, base))
+        return sorted([*self.extensions(base), *filter(None, others)], key=lambda found: -score(found, base))
 
-    def _with_one_from_elsewhere(self, base: Fit, name: str) -> Fit:
-        """A fit with an effect at another site; the same fit where there is nothing for it to explain."""
-        key = frozenset((*base.effects, name))
-        if key not in self._fits:
-            self._fits[key] = self._started(base, name) or base
-        return self._fits[key]
+    def _with_one_from_elsewhere(self, base: Fit, name: str) -> Fit | None:
+        """A fit with an effect at another site; None where the others leave nothing for it to explain."""
+        known = self._fits.get(frozenset((*base.effects, name)))
+        found = known or self._started(base, name)
+        return self.keep(found) if found else None
 
     def refitted_from(self, fit: Fit, larger: Fit) -> Fit:
         """A fit, or a better one of the same effects that starts from the noise of a larger fit.
