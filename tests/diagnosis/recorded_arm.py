@@ -17,18 +17,24 @@ ARM = """<mujoco><worldbody><body name="upper"><inertial pos="0 0 -0.2" mass="0.
 NOISE = 2e-5  # [rad]
 
 
-def arm(folder: Path) -> Model:
-    (folder / "arm.xml").write_text(ARM, encoding="utf-8")
+def arm(folder: Path, mjcf: str = ARM) -> Model:
+    """The arm, or another robot of torque drives."""
+    (folder / "arm.xml").write_text(mjcf, encoding="utf-8")
     return robot_from_mapping({"plant": "robot", "model": "arm.xml"}, "robot.yaml", folder).model
 
 
-def recorded(model: Model, seed: int) -> Recording:
-    """Ten seconds of slow and fast waves."""
-    rng, t = np.random.default_rng(seed), np.arange(0.0, 10.0, 0.004)
-    phases = rng.uniform(0.0, 6.3, (3, 2))
+def recorded(model: Model, seed: int, sizes: tuple[float, ...] = (0.5, 0.25)) -> Recording:
+    """Ten seconds of slow and fast waves, of some size at each joint [N or N m]."""
+    rng, t, plant = np.random.default_rng(seed), np.arange(0.0, 10.0, 0.004), model.plant
+    phases = rng.uniform(0.0, 6.3, (3, len(sizes)))
     waves = np.sin(2.0 * np.pi * np.array([0.4, 0.9, 1.7])[:, None, None] * t + phases[..., None])
-    commands = (waves.sum(axis=0) * np.array([0.5, 0.25])[:, None]).T
-    run = AnalyticSimulator().replay(ModelBatch(model), Inputs.of([t], [commands], [0]), np.zeros((4, 1, 1)))
-    q = run.coordinates[:, :, 0, 0] + NOISE * rng.normal(size=(len(t), 2))
-    columns = {"t": t, "shoulder": q[:, 0], "elbow": q[:, 1], "u_shoulder": commands[:, 0], "u_elbow": commands[:, 1]}
+    commands = (waves.sum(axis=0) * np.array(sizes)[:, None]).T
+    start = np.zeros((2 * len(sizes), 1, 1))
+    run = AnalyticSimulator().replay(ModelBatch(model), Inputs.of([t], [commands], [0]), start)
+    q = run.coordinates[:, :, 0, 0] + NOISE * rng.normal(size=(len(t), len(sizes)))
+    columns = {
+        "t": t,
+        **dict(zip(plant.coordinates, q.T, strict=True)),
+        **dict(zip(plant.commands, commands.T, strict=True)),
+    }
     return Recording("r1.csv", columns)

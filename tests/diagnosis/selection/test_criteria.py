@@ -81,3 +81,15 @@ def test_bristles_must_gain_more_beside_the_law_that_they_contain(case: Bench):
     assert criteria.tolerance(bristles, ("translation/coulomb",)) > criteria.tolerance(
         stribeck, ("translation/coulomb",)
     )
+
+
+@pytest.mark.parametrize(
+    ("friction", "numbers"),
+    [("coulomb", {"F_c": 0.4}), ("stribeck", {"F_c": 0.3, "F_s": 0.6, "v_s": 0.05})],
+)
+def test_a_rich_law_is_told_from_its_simple_one_where_it_acts(
+    friction: str, numbers: dict[str, float], fresh_seed: int
+):
+    case = bench("linear_axis", {f"translation/{friction}": numbers}, fresh_seed)
+    rich, plain = case.fit("translation/stribeck"), case.fit("translation/coulomb")
+    assert Criteria(case.fitter, case.fit()).tells_apart(rich, plain) == (friction == "stribeck")

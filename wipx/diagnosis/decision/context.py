@@ -119,8 +119,9 @@ class Context:
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors. What lasts of it makes innovations as much larger as earlier
-        ones foretell them. Random forces excuse nothing: they leave innovations white.
+        The worst is first. Noise is that of the sensors. Where earlier innovations foretell a share f of the variance
+        of later ones, it may last: then it is 1 / sqrt(1 - f) times as large as white noise. Random forces excuse
+        nothing: they leave innovations white.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)

@@ -9,7 +9,7 @@ may explain the same motion. So what all parts have found is fitted together, an
 are dropped before the next ones are looked for. At the end the parts exchange effects for better ones.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -162,7 +162,7 @@ class RobotSearch(Search):
         asked = set[frozenset[str]]()  # beside the effects that there are now
         seen = {frozenset(whole.fit.effects)}
         while awake and len(seen) - 1 != steps:
-            found = self._found_by_parts(whole.fit, awake, self._grown_in)
+            found = self._grown_by_parts(whole.fit, awake)
             larger = self.pruned(self._with_parts(whole.fit, found)).after(whole.considered + _considered(found))
             if frozenset(larger.fit.effects) in seen:
                 asked |= set(awake)
@@ -174,6 +174,11 @@ class RobotSearch(Search):
                 awake = tuple(sites for sites in awake if _has_changed(whole.fit, sites, found[sites]))
                 whole = larger
         return whole
+
+    def _grown_by_parts(self, whole: Fit, parts: Sequence[frozenset[str]]) -> dict[frozenset[str], Chosen]:
+        """What some parts of a fit become with a further effect each, beside all that the others have."""
+        found = self.store.fitter.simulator.side_by_side(lambda sites: self._grown_in(*self._part(whole, sites)), parts)
+        return dict(zip(parts, found, strict=True))
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with a further effect, where any may gain enough; laws that need no longer be rich are simple."""
@@ -188,13 +193,6 @@ class RobotSearch(Search):
         parts = self.split(whole, with_stand_ins=True)
         found = self.store.fitter.simulator.side_by_side(lambda part: part[0].exchanged(part[1]), parts)
         return dict(zip(self._parts_with_effects(whole), found, strict=True))
-
-    def _found_by_parts(
-        self, whole: Fit, parts: Sequence[frozenset[str]], change: Callable[[FitStore, Fit], Chosen]
-    ) -> dict[frozenset[str], Chosen]:
-        """What some parts of a fit become, each by itself beside all that the others have."""
-        found = self.store.fitter.simulator.side_by_side(lambda sites: change(*self._part(whole, sites)), parts)
-        return dict(zip(parts, found, strict=True))
 
     def _with_parts(self, whole: Fit, found: Mapping[frozenset[str], Chosen]) -> Fit:
         """A fit with what some parts have become; the same fit where none has other effects."""
