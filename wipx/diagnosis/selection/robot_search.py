@@ -17,7 +17,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.diagnosis.candidates.stand_ins import stand_ins
-from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
@@ -284,9 +284,20 @@ class RobotSearch(Search):
                 given.setdefault(effect, dict(whole.tolerances.get(effect, {})))[symbol] = value
         setting = replace(whole, nominal=whole.nominal.with_effects(given), sites=sites)
         fitter = self.store.fitter.beside(setting)
-        nominal = fitter.converged(fitter.fit(Hypothesis.of(setting, (), held.values), held.levels))
+        nominal = self._without_own(fitter, Hypothesis.of(setting, (), held.values), held)
         store = FitStore.of(fitter, setting, nominal)
         return store, store.keep(fitter.fit(Hypothesis.of(setting, own, held.values), held.levels)) if own else nominal
+
+    def _without_own(self, fitter: Fitter, others: Hypothesis, held: Held) -> Fit:
+        """The fit of a part without its effects, also from the noise of the nominal model where it got stuck.
+
+        It got stuck if it is less likely than the nominal model: noise that suits all effects may be far too quiet.
+        """
+        found = fitter.converged(fitter.fit(others, held.levels))
+        if found.log_likelihood >= self.nominal.log_likelihood:
+            return found
+        again = fitter.converged(fitter.fit(others, self.nominal.levels))
+        return max(found, again, key=lambda fit: fit.log_likelihood)
 
     def _search_in(self, store: FitStore, begun: Fit) -> Search:
         """The search of a part that begins at a fit."""
