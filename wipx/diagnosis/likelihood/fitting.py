@@ -29,6 +29,7 @@ SECANT = 0.3  # standard deviations over which later slopes are taken
 DAMPINGS = np.array([0.0, 0.03, 1.0, 30.0])  # relative; the first step is tried alone, the others together if it fails
 TRUSTED = 0.5  # share of what a linear model expects that a step must gain (Nocedal, Wright 2006, ch. 4)
 SETTLED = 0.05  # nats per step at which a refinement ends
+NEARBY = 0.5  # nats to be gained by a step of one standard deviation; slopes hold as far as that
 CONVERGED = 0.5  # nats at which alternating ends
 
 
@@ -98,6 +99,30 @@ class Fit:
     def information(self) -> np.ndarray:
         """Inverse covariance of the position in the cube, shape (D, D)."""
         return self.jacobian.T @ self.jacobian
+
+
+@dataclass(frozen=True)
+class Climb:
+    """A fit on its way to the best values at its levels.
+
+    Attributes:
+        fit: As far as it has come.
+        proposals: Positions in the cube to try next, one for each damping, the least damped first.
+        expected: Gain of the first of them, if errors change in proportion [nats].
+        close: Whether the slopes are taken too close to tell that nothing is to be gained.
+        settled: Whether the last step gained next to nothing.
+    """
+
+    fit: Fit
+    proposals: np.ndarray
+    expected: float
+    close: bool = False
+    settled: bool = False
+
+    @property
+    def has_arrived(self) -> bool:
+        """Whether a further step is worth nothing."""
+        return self.settled or not len(self.fit.hypothesis.cube) or (self.expected < SETTLED and not self.close)
 
 
 class Fitter(ABC):
@@ -259,38 +284,47 @@ class Fitter(ABC):
             levels: What is held fixed.
             steps: Levenberg-Marquardt steps at most.
         """
-        first = self._sloped(hypothesis, levels, np.full(len(hypothesis.cube), FIRST_STEP))
-        return self._improved(first, steps, local=True)
+        return self._climbed(self.begun(hypothesis, levels), steps)
 
     def refit(self, fit: Fit, levels: Any, *, steps: int = 6) -> Fit:
         """The best values at other levels than those of a fit, from its values on; arguments as `fit` has them."""
-        return self._improved(self._sloped(fit.hypothesis, levels, _secants(fit)), steps, local=False)
+        return self._climbed(self._climb(self._sloped(fit.hypothesis, levels, _secants(fit))), steps)
 
-    def _improved(self, here: Fit, steps: int, *, local: bool) -> Fit:
-        """The best values at the levels of a fit, from its values on.
+    def begun(self, hypothesis: Hypothesis, levels: Any) -> "Climb":
+        """A fit on its way, at the hypothesis' own values; arguments as `fit` has them."""
+        close = self._sloped(hypothesis, levels, np.full(len(hypothesis.cube), FIRST_STEP))
+        return self._climb(close, close=True)
 
-        Args:
-            here: The fit.
-            steps: Levenberg-Marquardt steps at most.
-            local: Whether its slopes are taken too close to tell that it cannot gain.
-        """
-        hypothesis, levels = here.hypothesis, here.levels
-        for step in range(steps if len(hypothesis.cube) else 0):
-            secants = _secants(here)
-            straight, *damped = self._proposals(here)
-            expected = _expected_gain(here, straight)
-            if expected < SETTLED and not (local and step == 0):
+    def stepped(self, climb: "Climb") -> "Climb":
+        """A fit on its way, one Levenberg-Marquardt step further."""
+        here = climb.fit
+        secants = _secants(here)
+        straight, *damped = climb.proposals
+        nearby = climb.expected < NEARBY and not climb.close
+        if nearby:
+            there = replace(self._best_of(here, straight[None]), jacobian=here.jacobian)
+        else:
+            there = self._sloped(here.hypothesis.at(straight), here.levels, secants)
+        if damped and there.log_likelihood - here.log_likelihood < TRUSTED * climb.expected:
+            other = self._best_of(here, np.stack(damped))
+            if other.log_likelihood > max(there.log_likelihood, here.log_likelihood):
+                there = self._sloped(other.hypothesis, here.levels, secants)
+        gain = there.log_likelihood - here.log_likelihood
+        if gain <= 0.0:
+            there = here if nearby else self._sloped(here.hypothesis, here.levels, secants)
+        return replace(self._climb(there), settled=gain < SETTLED)
+
+    def _climbed(self, climb: "Climb", steps: int) -> Fit:
+        """The best values that some steps lead to."""
+        for _ in range(steps):
+            if climb.has_arrived:
                 break
-            there = self._sloped(hypothesis.at(straight), levels, secants)
-            if damped and there.log_likelihood - here.log_likelihood < TRUSTED * expected:
-                other = self._best_of(here, np.stack(damped))
-                if other.log_likelihood > max(there.log_likelihood, here.log_likelihood):
-                    there = self._sloped(other.hypothesis, levels, secants)
-            gain = there.log_likelihood - here.log_likelihood
-            here = there if gain > 0.0 else self._sloped(here.hypothesis, levels, secants)
-            if gain < SETTLED:
-                break
-        return here
+            climb = self.stepped(climb)
+        return climb.fit
+
+    def _climb(self, fit: Fit, *, close: bool = False) -> "Climb":
+        proposals = self._proposals(fit)
+        return Climb(fit, proposals, _expected_gain(fit, proposals[0]), close)
 
     def white_of(self, fit: Fit, batch: ModelBatch) -> np.ndarray:
         """White errors of other models, with levels and noise of a fit, shape (P, N)."""

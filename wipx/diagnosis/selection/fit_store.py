@@ -3,22 +3,22 @@
 What is preferred is decided elsewhere (`criteria`, `search`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from wipx.diagnosis.candidates.screening import Candidate, candidates_beside, candidates_of_effect, unscaled
 from wipx.diagnosis.likelihood import nonsmooth_search
-from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import Climb, Fit, Fitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
+from wipx.diagnosis.selection import race
 from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_law, reduced_values
 from wipx.effects.catalogue import kind_of
 
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
-CLOSE = 0.5  # of the best gain, from which noise levels are searched too
 FITTED_TO_THE_END = 3  # effects for which they are, at most
 CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
 
@@ -175,7 +175,7 @@ class FitStore:
     def _started(self, base: Fit, effect: str) -> Fit | None:
         """A fit with one effect more that starts from where the others leave it room; None where they leave none."""
         starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
-        return self.fitter.converged(self._best_start(base, starts[:LOOKED_AT])) if starts else None
+        return self.fitter.converged(self._raced(base, [starts[:LOOKED_AT]])[0]) if starts else None
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.candidates_for(fit)
@@ -190,33 +190,40 @@ class FitStore:
         most = min(self.fitter.considered, CONSIDERED_IN_PART) if self.is_of_part else self.fitter.considered
         leading = [name for name in by_effect if by_effect[name][0].gain >= least][:most]
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
-        fits = [self._best_start(fit, by_effect[name][:LOOKED_AT]) for name in leading]
+        fits = self._raced(fit, [by_effect[name][:LOOKED_AT] for name in leading])
         fits.sort(key=lambda f: -score(f, fit))
         gains = [evidence(fit, f) for f in fits]
         polished = []
         for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
-            close = gain >= CLOSE * max(gains) and i < FITTED_TO_THE_END
+            close = gain >= race.CLOSE * max(gains) and i < FITTED_TO_THE_END
             polished.append(self.fitter.converged(found, rounds=1 if self.is_of_part else 4) if close else found)
             if close:
                 self._fits.setdefault(frozenset(found.effects), polished[-1])
         return sorted(polished, key=lambda f: -score(f, fit))
 
-    def _best_start(self, fit: Fit, starts: list[Candidate]) -> Fit:
-        effects = (*fit.effects, starts[0].effect)
-        own = [start.values for start in starts] + unscaled(self.setting, starts[0].effect)
-        values = [{**others, **start} for others in nonsmooth_search.beside(fit, starts[0].effect) for start in own]
-        begins = [Hypothesis.of(self.setting, effects, each) for each in values]
+    def _raced(self, fit: Fit, candidates: Sequence[list[Candidate]]) -> list[Fit]:
+        """The best fit with each of some effects more, as far as it is worth following."""
+        side_by_side = self.fitter.simulator.side_by_side
+        starts = side_by_side(lambda own: self._starts(fit, own), candidates)
+        fits = race.run(self.fitter, fit, starts, self.fitter.steps)
+
+        def searched(found: list[Fit]) -> Fit:
+            if kind_of(found[0].effects[-1]).non_smooth:
+                found = [nonsmooth_search.searched_by_trial(self.fitter, each) for each in found]
+            return max(found, key=lambda each: each.log_likelihood)
+
+        return side_by_side(searched, fits)
+
+    def _starts(self, fit: Fit, candidates: list[Candidate]) -> list[Climb]:
+        """Where fits with one effect more begin: at the likeliest of its candidates."""
+        name = candidates[0].effect
+        own = [start.values for start in candidates] + unscaled(self.setting, name)
+        values = [{**others, **start} for others in nonsmooth_search.beside(fit, name) for start in own]
+        begins = [Hypothesis.of(self.setting, (*fit.effects, name), each) for each in values]
         levels = self.fitter.spread_for(begins[0].model, fit.levels)
         count = 1 if self.is_of_part else STARTS
-        if nonsmooth_search.is_drive_delay(starts[0].effect):
-            begins += [
-                guess
-                for begin in begins[:: len(own)]
-                for guess in nonsmooth_search.delays(self.fitter, begin, starts[0].effect, levels)
-            ]
+        if nonsmooth_search.is_drive_delay(name):
+            first = begins[:: len(own)]
+            begins += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, levels)]
             count = nonsmooth_search.PEAKS
-        likeliest = self.fitter.likeliest(begins, levels, count)
-        fits = [self.fitter.fit(begin, levels, steps=self.fitter.steps) for begin in likeliest]
-        if kind_of(starts[0].effect).non_smooth:
-            fits = [nonsmooth_search.searched_by_trial(self.fitter, found) for found in fits]
-        return max(fits, key=lambda f: f.log_likelihood)
+        return [self.fitter.begun(begin, levels) for begin in self.fitter.likeliest(begins, levels, count)]

@@ -1,0 +1,57 @@
+"""A race of fits ends as if all of its runners had been fitted to the end."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from diagnosis.recorded import bench
+
+from wipx.diagnosis.candidates.screening import candidates_beside
+from wipx.diagnosis.likelihood.fitting import Climb
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.selection import race
+from wipx.diagnosis.selection.criteria import score
+
+HIDDEN = {
+    "friction": ("linear_axis", {"translation/coulomb": {"F_c": 1.0}}),
+    "late commands": ("pendulum", {"actuator/delay": {"tau": 0.02}}),
+    "two": ("wip", {"translation/coulomb": {"F_c": 1.0}, "sensor_theta/bias": {"b": 0.02}}),
+}
+STEPS = 6
+
+
+@dataclass(frozen=True)
+class Counted(InnovationFitter):
+    """A fitter that counts its steps."""
+
+    def stepped(self, climb: Climb) -> Climb:
+        """A step, counted by the effect that it is made for."""
+        counts[climb.fit.effects[-1]] = counts.get(climb.fit.effects[-1], 0) + 1
+        return super().stepped(climb)
+
+
+counts: dict[str, int] = {}
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_the_winner_is_that_of_fits_to_the_end_and_losers_drop_out(hidden: str, fresh_seed: int):
+    case = bench(*HIDDEN[hidden], fresh_seed)
+    fitter = Counted(case.fitter.innovations_model, case.fitter.rules)
+    nominal = case.fit()
+    starts: dict[str, list[Climb]] = {}
+    for candidate in candidates_beside(fitter, case.setting, nominal):
+        begin = Hypothesis.of(case.setting, (candidate.effect,), candidate.values)
+        own = starts.setdefault(candidate.effect, [])
+        if len(own) < 2:
+            own.append(fitter.begun(begin, fitter.spread_for(begin.model, nominal.levels)))
+    counts.clear()
+    raced = race.run(fitter, nominal, list(starts.values()), STEPS)
+    in_race = dict(counts)
+    whole = [
+        [fitter.fit(climb.fit.hypothesis, climb.fit.levels, steps=STEPS) for climb in own] for own in starts.values()
+    ]
+    raced_scores, scores = (np.array([max(score(f, nominal) for f in own) for own in fits]) for fits in (raced, whole))
+    assert raced_scores.argmax() == scores.argmax()
+    assert raced_scores.max() >= scores.max() - 1.0
+    assert sum(in_race.values()) < 0.7 * sum(counts[name] - in_race.get(name, 0) for name in counts)
