@@ -276,24 +276,28 @@ class Fitter(ABC):
     def whitened(self, errors: np.ndarray, noise: Noise) -> np.ndarray:
         """Errors (P, ...) made white, of the shape (P, *white)."""
 
-    def fit(self, hypothesis: Hypothesis, levels: Any, *, steps: int = 6) -> Fit:
+    def fit(self, hypothesis: Hypothesis, levels: Any, *, steps: int = 6, near: Fit | None = None) -> Fit:
         """The best values at given levels, from the hypothesis' own values on.
 
         Args:
             hypothesis: Where to start.
             levels: What is held fixed.
             steps: Levenberg-Marquardt steps at most.
+            near: A fit that tells how far its numbers may be off; None where nothing is known of that.
         """
-        return self._climbed(self.begun(hypothesis, levels), steps)
+        return self._climbed(self.begun(hypothesis, levels, near=near), steps)
 
     def refit(self, fit: Fit, levels: Any, *, steps: int = 6) -> Fit:
         """The best values at other levels than those of a fit, from its values on; arguments as `fit` has them."""
-        return self._climbed(self._climb(self._sloped(fit.hypothesis, levels, _secants(fit))), steps)
+        here = fit if levels is fit.levels else self._sloped(fit.hypothesis, levels, _secants(fit))
+        return self._climbed(self._climb(here), steps)
 
-    def begun(self, hypothesis: Hypothesis, levels: Any) -> "Climb":
+    def begun(self, hypothesis: Hypothesis, levels: Any, *, near: Fit | None = None) -> "Climb":
         """A fit on its way, at the hypothesis' own values; arguments as `fit` has them."""
-        close = self._sloped(hypothesis, levels, np.full(len(hypothesis.cube), FIRST_STEP))
-        return self._climb(close, close=True)
+        known = dict(zip(near.hypothesis.space.names, _secants(near), strict=True)) if near else {}
+        names = hypothesis.space.names
+        sloped = self._sloped(hypothesis, levels, np.array([known.get(name, FIRST_STEP) for name in names]))
+        return self._climb(sloped, close=not known.keys() >= set(names))
 
     def stepped(self, climb: "Climb") -> "Climb":
         """A fit on its way, one Levenberg-Marquardt step further."""

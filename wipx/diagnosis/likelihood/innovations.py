@@ -188,14 +188,16 @@ class InnovationFitter(Fitter):
 
     def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
-        for _ in range(rounds):
+        for k in range(rounds):
             before = fit.log_likelihood
-            fit = self._with_best_spread(self.refit(fit, self.levels_of(fit)))
+            fit = self.refit(fit, self.levels_of(fit, LEVEL_STEPS if k == 0 else LEVEL_STEPS[-1:]))
+            if fit.log_likelihood - before < CONVERGED or k == rounds - 1:
+                fit = self._with_best_spread(fit)
             if fit.log_likelihood - before < CONVERGED:
                 break
         return fit
 
-    def levels_of(self, fit: Fit) -> NoiseLevels:
+    def levels_of(self, fit: Fit, steps: Sequence[float] = LEVEL_STEPS) -> NoiseLevels:
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
         Groups of channels are searched side by side: what a level does to the likelihood of another group is left
@@ -204,12 +206,13 @@ class InnovationFitter(Fitter):
 
         Args:
             fit: Where to start.
+            steps: Of the logarithms, the longest first.
         """
         levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
         centre = best = _logarithms(levels)
         free = self._free_levels
-        for step in LEVEL_STEPS:
+        for step in steps:
             move = np.zeros_like(best)
             for _ in range(12):
                 moves = _single_moves(free, step, len(best))
@@ -227,7 +230,7 @@ class InnovationFitter(Fitter):
                 if there is None:
                     break
                 best = there
-        return _levels(best, levels)
+        return levels if best is centre else _levels(best, levels)
 
     @cached_property
     def _free_levels(self) -> tuple[tuple[int, ...], ...]:

@@ -75,7 +75,7 @@ class FitStore:
         if key not in self._fits:
             values = {**reduced_values(start), **start.hypothesis.values}
             hypothesis = Hypothesis.of(self.setting, effects, values)
-            found = self.fitter.fit(hypothesis, start.levels)
+            found = self.fitter.fit(hypothesis, start.levels, near=start)
             self._fits[key] = self.fitter.converged(found, rounds=2 if self.is_of_part else 4)
         return self._fits[key]
 
@@ -90,7 +90,7 @@ class FitStore:
         if setting is self.setting:
             return self.fitted(rest, fit)
         hypothesis = Hypothesis.of(setting, rest, fit.hypothesis.values)
-        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+        return self.fitter.converged(self.fitter.fit(hypothesis, fit.levels, near=fit), rounds=2)
 
     def with_reduced_law(self, fit: Fit, effect: str) -> Fit | None:
         """The fit with the simple law that an effect contains in its place; None where there is none or no room."""
