@@ -25,6 +25,7 @@ from wipx.identify.mean_commands import jolts
 from wipx.identify.sensors import delays_of, scales_of, true_states
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
+from wipx.sim.cache import cached
 from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Rollouts
 
@@ -82,12 +83,12 @@ class Smoother:
         late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
         shown = self._followed(batch, filters, group)
-        coordinates, rates = (_in_reach(x.transpose(0, 3, 1, 2)) for x in (shown.coordinates, shown.rates))
-        coordinates /= scale
-        surprises = self._measured.transpose(0, 2, 1)[..., None] / scale - coordinates
-        prior = np.concatenate(
-            [coordinates + self._moved_within(late, rates), rates], axis=2
-        )  # (K + 1, R, 2 joints, P)
+        rows, joints, models, recordings = shown.coordinates.shape
+        prior = np.empty((rows, recordings, 2 * joints, models))
+        surprises = np.empty((rows, recordings, joints, models))
+        _compared(shown.coordinates, shown.rates, self._measured, scale, prior, surprises)
+        if np.any(late):
+            prior[:, :, :joints] += self._moved_within(late, prior[:, :, joints:])
         if len(filters) == 1:
             found = filters[0].smoothed(prior, surprises)
         else:
@@ -198,15 +199,42 @@ class Smoother:
 
     def _first_states(self, batch: ModelBatch) -> np.ndarray:
         """True states at the first rows, by parabolas through what the sensors show, shape (2 joints, P, R)."""
-        joints, late = len(self.plant.coordinates), delays_of(batch)
-        shown = np.zeros((2 * joints, batch.size, len(self.recordings)))
+        late = delays_of(batch)[..., None]  # (joints, P, 1)
+        place, rate, half = self._first_courses[:, :, None]
+        return true_states(batch, np.concatenate([place + late * (rate + late * half), rate + 2.0 * late * half]))
+
+    @cached_property
+    def _first_courses(self) -> np.ndarray:
+        """Coefficients of the parabolas through the first rows, rising, shape (3, joints, R)."""
+        found = np.zeros((3, len(self.plant.coordinates), len(self.recordings)))
         for r, recording in enumerate(self.recordings):
             t = recording.t - recording.t[0]
             count = min(max(FEWEST_ROWS, int(np.searchsorted(t, FIRST_SPAN))), len(t))
             for j, name in enumerate(self.plant.coordinates):
-                course = np.polynomial.Polynomial.fit(t[:count], recording[name][:count], min(2, count - 1))
-                shown[j, :, r], shown[joints + j, :, r] = course(late[j]), course.deriv()(late[j])
-        return true_states(batch, shown)
+                course = np.polynomial.Polynomial.fit(t[:count], recording[name][:count], min(2, count - 1)).convert()
+                found[: len(course.coef), j, r] = course.coef
+        return found
+
+
+@cached
+def _compared(coordinates, rates, measured, scale, prior, surprises):
+    """States before their correction (K + 1, R, 2 joints, P), and by how much each row surprises (K + 1, R, joints, P).
+
+    What P models show has the shape (K + 1, joints, P, R), what is measured (K + 1, joints, R), the sensors' scale
+    (joints, P).
+    """
+    rows, joints, models, recordings = coordinates.shape
+    for k in range(rows):
+        for r in range(recordings):
+            for j in range(joints):
+                seen = measured[k, j, r]
+                for p in range(models):
+                    place, rate = coordinates[k, j, p, r], rates[k, j, p, r]
+                    place = min(max(place, -RUN_AWAY), RUN_AWAY) if place == place else 0.0
+                    rate = min(max(rate, -RUN_AWAY), RUN_AWAY) if rate == rate else 0.0
+                    prior[k, r, j, p] = place / scale[j, p]
+                    prior[k, r, joints + j, p] = rate
+                    surprises[k, r, j, p] = (seen - place) / scale[j, p]
 
 
 def _in_reach(values: np.ndarray) -> np.ndarray:

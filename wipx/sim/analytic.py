@@ -173,12 +173,12 @@ class _Run:
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
         self.out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))
-        self.past = self.layout.past(self.coefficients.on)
+        self.past = self.layout.past(self.coefficients.has)
         self.delivered = self.layout.held()
 
     def begin(self, initial: np.ndarray) -> int:
         """Row from which a replay must be simulated: that of the first step, where no sensor looks further back."""
-        row = 0 if self.coefficients.on[R.ON_SENSOR_DELAY] else int(self.inputs.first.min())
+        row = 0 if self.coefficients.has[:, R.ON_SENSOR_DELAY].any() else int(self.inputs.first.min())
         if row:
             states = self.layout.states(initial)
             self.out[:row] = np.concatenate([states[:, R.Q], states[:, R.V]])

@@ -19,11 +19,11 @@ LOST = 1e6  # [m, rad, m/s, rad/s]; beyond it a rollout has fallen over, and the
 
 
 @cached
-def show(B, n, on, has, past, t_rows, lanes, k, out, lane0, count, path, until):
+def show(B, n, has, past, t_rows, lanes, k, out, lane0, count, path, until):
     """Put the state where a path leads, if one does, and write what the sensors show at row k."""
     if k < len(path):
         guide(B, lanes, k, lane0, count, path, until)
-    record(B, n, on, has, past, t_rows, lanes, k, out, lane0, count)
+    record(B, n, has, past, t_rows, lanes, k, out, lane0, count)
 
 
 @cached

@@ -271,11 +271,11 @@ def rollout(
         for k in range(first_row, last_row):
             if k < len(path):
                 guide(B, lanes, k, lane0, count, path, until)
-            record(B, n, on, has, past, t_rows, lanes, k, out, lane0, count)
+            record(B, n, has, past, t_rows, lanes, k, out, lane0, count)
             if follows:
                 for w in range(count):
                     counts[w] = substeps[k, lanes[0, w]]
-                correct(B, on, past, t_rows, lanes, k, lane0, count, measured, observer, group, counts)
+                correct(B, has, past, t_rows, lanes, k, lane0, count, measured, observer, group, counts)
             if closed:
                 feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:
@@ -289,7 +289,7 @@ def rollout(
                     pushed(B, joints, n)
             if on[R.ON_REPORT]:
                 report(S, B, counts, k, lane0, count, delivered)
-        record(B, n, on, has, past, t_rows, lanes, last_row, out, lane0, count)
+        record(B, n, has, past, t_rows, lanes, last_row, out, lane0, count)
         for w in range(count):
             for j in range(joints):
                 for i in range(R.STATES):

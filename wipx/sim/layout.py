@@ -98,10 +98,10 @@ class Layout:
         states[:, self.pattern] = path.states.reshape(rows, len(self.pattern), -1)
         return states, path.until.astype(np.int64)
 
-    def past(self, on: np.ndarray) -> np.ndarray:
+    def past(self, has: np.ndarray) -> np.ndarray:
         """Room for the true course (K + 1, 2 N, lanes) that late sensors need; one number where none is late."""
-        shape = (self.rows + 1, 2 * self.width, self.lanes) if on[R.ON_SENSOR_DELAY] else (1, 2 * self.width, 1)
-        return np.zeros(shape)
+        late = has[:, R.ON_SENSOR_DELAY].any()
+        return np.zeros((self.rows + 1, 2 * self.width, self.lanes) if late else (1, 2 * self.width, 1))
 
     def recorded(self) -> np.ndarray:
         """Commands of the windows, shape (K, N, R)."""

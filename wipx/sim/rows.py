@@ -84,7 +84,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
 (
     ON_TREE, ON_DOUBLE,  # robots from model files, double pendulum; else the wip family
     ON_EVENT, ON_TILT,
-    ON_DELAY, ON_SENSOR_DELAY, ON_DAMPING, ON_FRICTION, ON_SMOOTHING,  # on any joint
+    ON_DELAY, ON_DAMPING, ON_FRICTION, ON_SMOOTHING,  # on any joint
     ON_TIME,  # where the time of a step counts
     ON_RAMP, ON_REPORT,
     ON_ENGINE,  # moves the rigid body
@@ -97,7 +97,7 @@ TOGETHER = 16  # lanes that the compiler computes at once; blocks are filled up 
     ON_PATH, ON_LAWS,  # any stage of the path through the drive; any law of friction beyond a level and damping
     ON_MEMORY,  # any part that must know whether it began
     ON_SERVO, ON_SPRING, ON_OFFSET, ON_DEAD_ZONE, ON_SAG, ON_GAIN, ON_SATURATION, ON_SPEED_LIMIT, ON_BACK_EMF, ON_LAG,
-    ON_RIPPLE, ON_BACKLASH, ON_ELASTICITY, ON_ECCENTRICITY,
+    ON_RIPPLE, ON_BACKLASH, ON_ELASTICITY, ON_SENSOR_DELAY, ON_ECCENTRICITY,
     ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_HYSTERESIS, ON_PAPER, ON_REMAINDER, ON_SWING,
     JOINT_FLAGS,
     *_,

@@ -25,14 +25,14 @@ def interpolate(past, t_rows, window, k, j, lane, moment):
 
 
 @law
-def record(B, n, on, has, past, t_rows, lanes, k, out, lane0, count):
+def record(B, n, has, past, t_rows, lanes, k, out, lane0, count):
     """Write what the sensors show at row k: coordinates as recorded, rates as they are."""
     joints = out.shape[1] // 2
     for j in range(joints):
         J = B[j]
         for w in range(n):
             J[R.SHOWN * W + w] = (1.0 + J[R.SCALE * W + w]) * J[R.Q * W + w] + J[R.BIAS * W + w]
-        if on[R.ON_SENSOR_DELAY]:
+        if has[j, R.ON_SENSOR_DELAY]:
             for w in range(count):
                 past[k, j, lane0 + w] = J[R.Q * W + w]
                 past[k, joints + j, lane0 + w] = J[R.V * W + w]
@@ -90,7 +90,7 @@ def feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, no
 
 
 @law
-def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, group, counts):
+def correct(B, has, past, t_rows, lanes, k, lane0, count, measured, gains, group, counts):
     """Move the state by what an observer's gains make of recorded minus shown, at a row of the log.
 
     `measured` has the coordinates of N joints, and maybe their rates, shape (K + 1, channels, R). `gains` has the shape
@@ -124,7 +124,7 @@ def correct(B, on, past, t_rows, lanes, k, lane0, count, measured, gains, group,
                         extra += gain[2 * joints + j, joints + i] * speed
             J[R.Q * W + w] += way
             J[R.V * W + w] += rate
-            if on[R.ON_SENSOR_DELAY]:
+            if has[j, R.ON_SENSOR_DELAY]:
                 correct_past(past, t_rows, window, k, j, lane0 + w, way, rate, J[R.SENSOR_DELAY * W + w])
             if pushes and counts[w] > 0:
                 J[R.EXTRA * W + w] += extra

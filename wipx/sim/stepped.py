@@ -173,7 +173,7 @@ class _Run:
         self.coefficients.on[R.ON_ENGINE] = True
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
-        self.past = self.layout.past(self.coefficients.on)
+        self.past = self.layout.past(self.coefficients.has)
 
     def advance(
         self,
@@ -243,7 +243,7 @@ class _Run:
         n = filled(count)
         pattern, driven = self.layout.pattern, self.layout.driven
         for k in range(self.layout.rows):
-            show(B, n, on, has, self.past, t, lanes, k, out, first, count, led, until)
+            show(B, n, has, self.past, t, lanes, k, out, first, count, led, until)
             if controller is not None:
                 commands[k, driven, 0] = controller(float(t[k, 0]), out[k, pattern, 0])
             least, most = begin(
@@ -274,4 +274,4 @@ class _Run:
                 between(A, S, B, n, X, on, has, rigid)
                 world.advance()
                 after(S, B, n, X)
-        show(B, n, on, has, self.past, t, lanes, self.layout.rows, out, first, count, led, until)
+        show(B, n, has, self.past, t, lanes, self.layout.rows, out, first, count, led, until)
