@@ -46,7 +46,7 @@ def test_the_winner_is_that_of_fits_to_the_end_and_losers_drop_out(hidden: str, 
         if len(own) < 2:
             own.append(fitter.begun(begin, fitter.spread_for(begin.model, nominal.levels)))
     counts.clear()
-    raced = race.run(fitter, nominal, list(starts.values()), STEPS)
+    raced = race.run(lambda climbs: list(map(fitter.stepped, climbs)), nominal, list(starts.values()), STEPS)
     in_race = dict(counts)
     whole = [
         [fitter.fit(climb.fit.hypothesis, climb.fit.levels, steps=STEPS) for climb in own] for own in starts.values()

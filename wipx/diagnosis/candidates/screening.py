@@ -70,9 +70,15 @@ def candidates_beside(
         fit: What is already explained.
         outside_vocabulary: Whether to look at the effects that contract section 3 lacks instead of those it has.
     """
-    names = names_beside(fitter, setting, fit, outside_vocabulary=outside_vocabulary)
-    found = [each for name in names for each in candidates_of_effect(fitter, setting, fit, name)]
-    return sorted(found, key=lambda candidate: -candidate.gain)
+    names = list(names_beside(fitter, setting, fit, outside_vocabulary=outside_vocabulary))
+
+    def candidates(name: str) -> list[Candidate]:
+        return candidates_of_effect(fitter, setting, fit, name)
+
+    # Parts of a robot of many joints are side by side already.
+    small = setting.nominal.plant.tree is None
+    found = fitter.simulator.side_by_side(candidates, names) if small else map(candidates, names)
+    return sorted((each for own in found for each in own), key=lambda candidate: -candidate.gain)
 
 
 def names_beside(fitter: Fitter, setting: Setting, fit: Fit, *, outside_vocabulary: bool = False) -> Iterator[str]:

@@ -3,8 +3,9 @@
 What is preferred is decided elsewhere (`criteria`, `search`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,8 +18,12 @@ from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import reduced_law, reduced_values
 from wipx.effects.catalogue import kind_of
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
+WORTH_TRIALS = 0.25  # of the best score, from which a rough effect is searched by trial; that has up to doubled it
 FITTED_TO_THE_END = 3  # effects for which they are, at most
 CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
 
@@ -192,27 +197,35 @@ class FitStore:
         leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
         fits = self._raced(fit, [by_effect[name][:LOOKED_AT] for name in leading])
         fits.sort(key=lambda f: -score(f, fit))
-        gains = [evidence(fit, f) for f in fits]
-        polished = []
-        for i, (found, gain) in enumerate(zip(fits, gains, strict=True)):
-            close = gain >= race.CLOSE * max(gains) and i < FITTED_TO_THE_END
-            polished.append(self.fitter.converged(found, rounds=1 if self.is_of_part else 4) if close else found)
-            if close:
-                self._fits.setdefault(frozenset(found.effects), polished[-1])
-        return sorted(polished, key=lambda f: -score(f, fit))
+        least = race.CLOSE * max((evidence(fit, f) for f in fits), default=0.0)
+        close = [f for f in fits[:FITTED_TO_THE_END] if evidence(fit, f) >= least]
+        rest = [f for f in fits if all(f is not other for other in close)]
+        rounds = 1 if self.is_of_part else 4
+        ends = self._side_by_side(lambda f: self.fitter.converged(f, rounds=rounds), close)
+        for end in ends:
+            self._fits.setdefault(frozenset(end.effects), end)
+        return sorted([*ends, *rest], key=lambda f: -score(f, fit))
+
+    def _side_by_side(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """What some work makes of each item, several at the same time; parts of a robot are side by side already."""
+        return [work(item) for item in items] if self.is_of_part else self.fitter.simulator.side_by_side(work, items)
 
     def _raced(self, fit: Fit, candidates: Sequence[list[Candidate]]) -> list[Fit]:
         """The best fit with each of some effects more, as far as it is worth following."""
-        side_by_side = self.fitter.simulator.side_by_side
-        starts = side_by_side(lambda own: self._starts(fit, own), candidates)
-        fits = race.run(self.fitter, fit, starts, self.fitter.steps)
+        starts = self._side_by_side(lambda own: self._starts(fit, own), candidates)
+        fits = race.run(self._stepped, fit, starts, self.fitter.steps)
+        least = race.least_score([each for own in fits for each in own], fit, WORTH_TRIALS)
 
-        def searched(found: list[Fit]) -> Fit:
-            if kind_of(found[0].effects[-1]).non_smooth:
-                found = [nonsmooth_search.searched_by_trial(self.fitter, each) for each in found]
-            return max(found, key=lambda each: each.log_likelihood)
+        def searched(each: Fit) -> Fit:
+            rough = kind_of(each.effects[-1]).non_smooth is not None and score(each, fit) >= least
+            return nonsmooth_search.searched_by_trial(self.fitter, each) if rough else each
 
-        return side_by_side(searched, fits)
+        ends = self._side_by_side(lambda own: [searched(each) for each in own], fits)
+        return [max(own, key=lambda each: each.log_likelihood) for own in ends]
+
+    def _stepped(self, climbs: Sequence[Climb]) -> list[Climb]:
+        """Fits on their way, one step further each."""
+        return self._side_by_side(self.fitter.stepped, climbs)
 
     def _starts(self, fit: Fit, candidates: list[Candidate]) -> list[Climb]:
         """Where fits with one effect more begin: at the likeliest of its candidates."""
