@@ -220,6 +220,7 @@ def real_arm(name: str) -> RecordingSource:
     return RecordingSource(path=str(folder))
 
 
+@pytest.mark.slow
 def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_beside_the_counterbalance():
     source = real_arm("kuka_kr300")
     found = asked_for(source.describe().model, source.load())
@@ -228,6 +229,7 @@ def test_axis_two_of_a_real_arm_has_the_friction_and_the_rotor_of_its_maker_besi
     assert found["A2/spring.k"] > 3000.0
 
 
+@pytest.mark.slow
 def test_friction_that_takes_nearly_all_force_of_a_real_wrist_is_no_share_of_that_force():
     source = real_arm("staubli_tx40")
     found = asked_for(source.describe().model, source.load())
@@ -236,6 +238,7 @@ def test_friction_that_takes_nearly_all_force_of_a_real_wrist_is_no_share_of_tha
     assert "joint_4/load_friction.K_motor" not in found
 
 
+@pytest.mark.slow
 def test_the_light_wrist_of_a_real_description_does_not_hide_the_arms_friction():
     source = real_arm("ur10_unisa")
     found = asked_for(source.describe().model, source.load())

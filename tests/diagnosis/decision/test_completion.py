@@ -61,6 +61,7 @@ def test_a_drive_that_does_not_sag_does_not_in_the_completed_model(fresh_seed: i
     assert completed(knowing, friction) is friction
 
 
+@pytest.mark.slow
 def test_what_every_machine_has_is_in_the_model_but_not_named(fresh_seed: int):
     case = shaken(
         bench("linear_axis", {**FRICTION, **SAG}, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed)
