@@ -162,6 +162,10 @@ class FitStore:
         better = self._best_of(fit, self._escaped(fit))
         return fit if better is fit else self.escaped(better)
 
+    def side_by_side(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+        """What some work makes of each item, several at the same time; parts of a robot are side by side already."""
+        return [work(item) for item in items] if self.is_of_part else self.fitter.simulator.side_by_side(work, items)
+
     def _escaped(self, fit: Fit) -> list[Fit]:
         """Fits from near one: forces that explain a misfit make it hard to leave, louder ones smooth the likelihood."""
         found = [self.fitter.converged(self.fitter.refit(fit, self.fitter.escape_levels(fit)))]
@@ -201,18 +205,14 @@ class FitStore:
         close = [f for f in fits[:FITTED_TO_THE_END] if evidence(fit, f) >= least]
         rest = [f for f in fits if all(f is not other for other in close)]
         rounds = 1 if self.is_of_part else 4
-        ends = self._side_by_side(lambda f: self.fitter.converged(f, rounds=rounds), close)
+        ends = self.side_by_side(lambda f: self.fitter.converged(f, rounds=rounds), close)
         for end in ends:
             self._fits.setdefault(frozenset(end.effects), end)
         return sorted([*ends, *rest], key=lambda f: -score(f, fit))
 
-    def _side_by_side(self, work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-        """What some work makes of each item, several at the same time; parts of a robot are side by side already."""
-        return [work(item) for item in items] if self.is_of_part else self.fitter.simulator.side_by_side(work, items)
-
     def _raced(self, fit: Fit, candidates: Sequence[list[Candidate]]) -> list[Fit]:
         """The best fit with each of some effects more, as far as it is worth following."""
-        starts = self._side_by_side(lambda own: self._starts(fit, own), candidates)
+        starts = self.side_by_side(lambda own: self._starts(fit, own), candidates)
         fits = race.run(self._stepped, fit, starts, self.fitter.steps)
         least = race.least_score([each for own in fits for each in own], fit, WORTH_TRIALS)
 
@@ -220,12 +220,12 @@ class FitStore:
             rough = kind_of(each.effects[-1]).non_smooth is not None and score(each, fit) >= least
             return nonsmooth_search.searched_by_trial(self.fitter, each) if rough else each
 
-        ends = self._side_by_side(lambda own: [searched(each) for each in own], fits)
+        ends = self.side_by_side(lambda own: [searched(each) for each in own], fits)
         return [max(own, key=lambda each: each.log_likelihood) for own in ends]
 
     def _stepped(self, climbs: Sequence[Climb]) -> list[Climb]:
         """Fits on their way, one step further each."""
-        return self._side_by_side(self.fitter.stepped, climbs)
+        return self.side_by_side(self.fitter.stepped, climbs)
 
     def _starts(self, fit: Fit, candidates: list[Candidate]) -> list[Climb]:
         """Where fits with one effect more begin: at the likeliest of its candidates."""

@@ -7,6 +7,7 @@ and what it considered; fits are kept in a `FitStore`, and `Criteria` decide bet
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar, Self
 
 from wipx.core.diagnosis import ConsideredEffect
@@ -186,9 +187,7 @@ class Search:
         considered: History = ()
         for _ in range(self.exchanges):
             best, most = fit, self.rules.least_lead
-            for effect in fit.effects:
-                base = self.store.without(fit, effect)
-                found = self.preferred(self.store.replacements(fit, effect), base)
+            for base, found in self.store.side_by_side(partial(self._replaced, fit), fit.effects):
                 lead = most if found is None else self.criteria.lead(found, fit)
                 if found is not None and lead > most and self.criteria.gains_enough(base, found):
                     best, most = found, lead
@@ -200,6 +199,11 @@ class Search:
             pruned = self.pruned(self.store.restarted(self.store.keep(best), best.effects[-1]))
             fit, considered = pruned.fit, considered + pruned.considered
         return Chosen(fit, considered)
+
+    def _replaced(self, fit: Fit, effect: str) -> tuple[Fit, Fit | None]:
+        """The fit without an effect, and the best one with another in its place; None where there is none."""
+        base = self.store.without(fit, effect)
+        return base, self.preferred(self.store.replacements(fit, effect), base)
 
     def _worth_it(self, current: Fit, extended: list[Fit], fleeting: set[frozenset[str]]) -> Fit | None:
         """The first fit whose further effect is worth it, or the simple law of a rich one that is not; None without.
