@@ -6,7 +6,7 @@ from wipx.diagnosis.likelihood.fitting import Climb, Fit
 from wipx.diagnosis.selection.criteria import score
 
 CLOSE = 0.5  # of the best score, up to which a candidate stays in the race
-FURTHER = 2.0  # times what a linear model expects of a step that a fit may still gain
+FURTHER = 5.0  # times what a linear model expects of a step that a fit may still gain
 
 
 def run(
@@ -41,6 +41,8 @@ def least_score(fits: Sequence[Fit], base: Fit, share: float) -> float:
 
 def _may_win(climb: Climb, own: Sequence[Climb], base: Fit, least: float) -> bool:
     """Whether a fit may still reach a score, and the best of those from other starts of its candidate."""
+    if climb.close:
+        return True
     further = FURTHER * climb.expected
     leading = max(other.fit.log_likelihood for other in own)
     return score(climb.fit, base) + further >= least and climb.fit.log_likelihood + further >= leading
