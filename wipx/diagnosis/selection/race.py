@@ -6,7 +6,7 @@ from wipx.diagnosis.likelihood.fitting import Climb, Fit
 from wipx.diagnosis.selection.criteria import score
 
 CLOSE = 0.5  # of the best score, up to which a candidate stays in the race
-FURTHER = 5.0  # times what a linear model expects of a step that a fit may still gain; 2 lost a real joint's friction
+FURTHER = 5.0  # times what a linear model expects of a step that a fit may still gain; 2 was too few on a real robot
 
 
 def run(
