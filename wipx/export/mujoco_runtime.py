@@ -143,7 +143,7 @@ class Runtime:
         self._t = np.full((layout.rows + 1, 1), AFTER_THE_END)
         self._t[0] = 0.0
         self._u = np.zeros((layout.rows, width, 1))
-        self._past, self._out = layout.past(self._laws.on), np.zeros((layout.rows + 1, 2 * width, 1))
+        self._past, self._out = layout.past(self._laws.has), np.zeros((layout.rows + 1, 2 * width, 1))
         self._lanes = np.zeros((2, W), dtype=np.int64)
         self._pointers, self._counts = np.zeros((width, W), dtype=np.int64), np.zeros(W, dtype=np.int64)
         self._row = 0
