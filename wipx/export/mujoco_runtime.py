@@ -230,9 +230,8 @@ class Runtime:
         joints[:, R.V * W : (R.V + 1) * W] = self.v[:, None]
 
     def _show(self) -> None:
-        on, has = self._laws.on, self._laws.has
-        past, t, row = self._past, self._t, self._row
-        show(self._joints, ALONE, on, has, past, t, self._lanes, row, self._out, 0, 1, *self._unused)
+        has, past, t, row = self._laws.has, self._past, self._t, self._row
+        show(self._joints, ALONE, has, past, t, self._lanes, row, self._out, 0, 1, *self._unused)
 
     def _forget(self) -> None:
         """Keep the rows of the longest delay only."""
