@@ -1,6 +1,7 @@
 """A race of fits ends as if all of its runners had been fitted to the end."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ HIDDEN = {
     "two": ("wip", {"translation/coulomb": {"F_c": 1.0}, "sensor_theta/bias": {"b": 0.02}}),
 }
 STEPS = 6
+FAR = 12.0  # nats that a step is expected to gain
 
 
 @dataclass(frozen=True)
@@ -55,3 +57,33 @@ def test_the_winner_is_that_of_fits_to_the_end_with_no_more_steps(hidden: str, f
     assert raced_scores.argmax() == scores.argmax()
     assert raced_scores.max() >= scores.max() - 1.0
     assert sum(in_race.values()) <= sum(counts[name] - in_race.get(name, 0) for name in counts)
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected", "close", "steps"),
+    [
+        (50.0, 4.0, False, 0),  # reaches 70 of the 100 that half of the best score takes
+        (50.0, FAR, False, STEPS),
+        (50.0, 4.0, True, 1),  # its slopes cannot be trusted before the first step
+        (150.0, 4.0, False, STEPS),
+    ],
+    ids=["hopeless", "within reach", "not known yet", "close behind"],
+)
+def test_a_fit_drops_out_once_it_cannot_win(gain: float, expected: float, close: bool, steps: int, fresh_seed: int):
+    case = bench("linear_axis", {}, fresh_seed)
+    nominal, other = case.fit(), case.fit("translation/coulomb")
+    loss = score(other, nominal)
+    made: list[float] = []
+
+    def climb(gain: float, expected: float, *, close: bool = False) -> Climb:
+        return Climb(
+            replace(other, log_likelihood=other.log_likelihood - loss + gain), np.zeros((1, 1)), expected, close
+        )
+
+    def stepped(climbs: Sequence[Climb]) -> list[Climb]:
+        made.extend(each.fit.log_likelihood for each in climbs)
+        return [replace(each, close=False) for each in climbs]
+
+    follower = climb(gain, expected, close=close)
+    race.run(stepped, nominal, [[climb(200.0, FAR)], [follower]], STEPS)
+    assert made.count(follower.fit.log_likelihood) == steps

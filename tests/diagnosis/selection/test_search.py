@@ -3,9 +3,11 @@
 from diagnosis.recorded import Bench, bench
 
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search
+from wipx.sim.analytic import AnalyticSimulator
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 
@@ -38,6 +40,15 @@ def test_a_second_run_of_a_search_says_the_same(fresh_seed: int):
     assert second.fit is first.fit
     assert second.considered == first.considered
     assert search.nominal is nominal
+
+
+def test_threads_change_nothing(fresh_seed: int):
+    case = bench("linear_axis", {**FRICTION, "actuator/dead_zone": {"band": 0.5}}, fresh_seed)
+    robot = KnownRobot(case.nominal, {})
+    one, three = (diagnose(case.recordings, robot, AnalyticSimulator(threads=threads)) for threads in (1, 3))
+    assert [(each.name, each.parameters) for each in one.effects] == [
+        (each.name, each.parameters) for each in three.effects
+    ]
 
 
 def test_a_superfluous_effect_is_pruned_and_told(fresh_seed: int):
