@@ -83,11 +83,9 @@ class Smoother:
         late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
         shown = self._followed(batch, filters, group)
-        rows, joints, models, recordings = shown.coordinates.shape
-        prior = np.empty((rows, recordings, 2 * joints, models))
-        surprises = np.empty((rows, recordings, joints, models))
-        _compared(shown.coordinates, shown.rates, self._measured, scale, prior, surprises)
+        prior, surprises = self._compared(shown, scale)
         if np.any(late):
+            joints = surprises.shape[2]
             prior[:, :, :joints] += self._moved_within(late, prior[:, :, joints:])
         if len(filters) == 1:
             found = filters[0].smoothed(prior, surprises)
@@ -129,8 +127,21 @@ class Smoother:
         each = self.filtered(model, bandwidth, nowhere)
         shown = self._followed(ModelBatch(model), [each], np.zeros(1, dtype=np.int64))
         joints = self._measured.shape[1]
-        surprises = _in_reach(self._measured - shown.coordinates[:, :, 0]) / scales_of(ModelBatch(model))
-        return np.cumsum(np.einsum("krij,kjr->kir", each.along.gains[:, :, 2 * joints :], surprises), axis=0)
+        surprises = self._compared(shown, scales_of(ModelBatch(model)))[1][..., 0]
+        return np.cumsum(np.einsum("krij,krj->kir", each.along.gains[:, :, 2 * joints :], surprises), axis=0)
+
+    def _compared(self, shown: Rollouts, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States before their correction, and by how much each row surprises, of sensors with a scale (joints, P).
+
+        Returns:
+            prior: Shape (K + 1, R, 2 joints, P).
+            surprises: Shape (K + 1, R, joints, P).
+        """
+        rows, joints, models, recordings = shown.coordinates.shape
+        prior = np.empty((rows, recordings, 2 * joints, models))
+        surprises = np.empty((rows, recordings, joints, models))
+        _compare(shown.coordinates, shown.rates, self._measured, scale, prior, surprises)
+        return prior, surprises
 
     def _followed(self, batch: ModelBatch, filters: Sequence[Filter], group: np.ndarray) -> Rollouts:
         """What P models, each kept close by one of the filters, show at every row before they are corrected there."""
@@ -217,11 +228,10 @@ class Smoother:
 
 
 @cached
-def _compared(coordinates, rates, measured, scale, prior, surprises):
-    """States before their correction (K + 1, R, 2 joints, P), and by how much each row surprises (K + 1, R, joints, P).
+def _compare(coordinates, rates, measured, scale, prior, surprises):
+    """Write what `Smoother._compared` tells, in finite numbers: at most `RUN_AWAY` where a model diverges.
 
-    What P models show has the shape (K + 1, joints, P, R), what is measured (K + 1, joints, R), the sensors' scale
-    (joints, P).
+    What P models show has the shape (K + 1, joints, P, R), what is measured (K + 1, joints, R).
     """
     rows, joints, models, recordings = coordinates.shape
     for k in range(rows):
@@ -235,8 +245,3 @@ def _compared(coordinates, rates, measured, scale, prior, surprises):
                     prior[k, r, j, p] = place / scale[j, p]
                     prior[k, r, joints + j, p] = rate
                     surprises[k, r, j, p] = (seen - place) / scale[j, p]
-
-
-def _in_reach(values: np.ndarray) -> np.ndarray:
-    """The same in finite numbers: zero where nothing is recorded, at most `RUN_AWAY` where a model diverges."""
-    return np.clip(np.nan_to_num(values), -RUN_AWAY, RUN_AWAY)

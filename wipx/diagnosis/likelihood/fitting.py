@@ -292,14 +292,14 @@ class Fitter(ABC):
         here = fit if levels is fit.levels else self._sloped(fit.hypothesis, levels, _secants(fit))
         return self._climbed(self._climb(here), steps)
 
-    def begun(self, hypothesis: Hypothesis, levels: Any, *, near: Fit | None = None) -> "Climb":
+    def begun(self, hypothesis: Hypothesis, levels: Any, *, near: Fit | None = None) -> Climb:
         """A fit on its way, at the hypothesis' own values; arguments as `fit` has them."""
         known = dict(zip(near.hypothesis.space.names, _secants(near), strict=True)) if near else {}
         names = hypothesis.space.names
         sloped = self._sloped(hypothesis, levels, np.array([known.get(name, FIRST_STEP) for name in names]))
         return self._climb(sloped, close=not known.keys() >= set(names))
 
-    def stepped(self, climb: "Climb") -> "Climb":
+    def stepped(self, climb: Climb) -> Climb:
         """A fit on its way, one Levenberg-Marquardt step further."""
         here = climb.fit
         secants = _secants(here)
@@ -318,7 +318,7 @@ class Fitter(ABC):
             there = here if nearby else self._sloped(here.hypothesis, here.levels, secants)
         return replace(self._climb(there), settled=gain < SETTLED)
 
-    def _climbed(self, climb: "Climb", steps: int) -> Fit:
+    def _climbed(self, climb: Climb, steps: int) -> Fit:
         """The best values that some steps lead to."""
         for _ in range(steps):
             if climb.has_arrived:
@@ -326,7 +326,7 @@ class Fitter(ABC):
             climb = self.stepped(climb)
         return climb.fit
 
-    def _climb(self, fit: Fit, *, close: bool = False) -> "Climb":
+    def _climb(self, fit: Fit, *, close: bool = False) -> Climb:
         proposals = self._proposals(fit)
         return Climb(fit, proposals, _expected_gain(fit, proposals[0]), close)
 

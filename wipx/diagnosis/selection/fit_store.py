@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 
 LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
-WORTH_TRIALS = 0.25  # of the best score, from which a rough effect is searched by trial; that has up to doubled it
+WORTH_TRIALS = 0.25  # of the best score, from which a rough effect is searched by trial; all that won so had half
 FITTED_TO_THE_END = 3  # effects for which they are, at most
 CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
 
