@@ -70,3 +70,15 @@ def test_a_deviation_shrinks_with_the_root_of_the_recordings():
     few, many = (best_prospects(bench("linear_axis", {}, seed=4, count=n))["translation/viscous"] for n in (2, 8))
     assert many.deviation == pytest.approx(0.5 * few.deviation, rel=0.35)  # excitations are drawn afresh
     assert np.isfinite(few.deviation)
+
+
+def test_a_start_makes_room_for_an_effect_that_another_one_stood_in_for():
+    case = bench("linear_axis", {"actuator/gain": {"k": 1.1}, "translation/viscous": {"sigma": 2.0}}, seed=4)
+    base = case.fitter.fit(Hypothesis.of(case.setting, ("translation/viscous",), {}), case.quiet)
+    gain = next(c for c in candidates_beside(case.fitter, case.setting, base) if c.effect == "actuator/gain")
+    values = [{**base.hypothesis.values, **gain.values}, *gain.moved]
+    starts = [Hypothesis.of(case.setting, (*base.effects, "actuator/gain"), each) for each in values]
+    alone, moved, partway = case.fitter.likelihoods_of(starts, base.levels)
+    assert moved > alone
+    assert partway > base.log_likelihood
+    assert gain.moved[0]["translation/viscous.sigma"] == pytest.approx(2.0, rel=0.2)

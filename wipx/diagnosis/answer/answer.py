@@ -177,7 +177,7 @@ def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tu
         if name == effect or _is_richer(other, name, effect, context.data):
             continue
         starts = _starts(context, fit, other, effect, name)
-        start = context.fitter.likeliest(starts, fit.levels, 1)[0]
+        start = context.fitter.ranked(starts, fit.levels)[0]
         close = evidence(other, fit) < max(context.fitter.close_call, CLOSE_SHARE * evidence(base, fit))
         if close or start is not starts[0]:
             again = context.fitter.converged(context.fitter.fit(start, fit.levels))

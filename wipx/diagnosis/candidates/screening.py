@@ -24,6 +24,8 @@ from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
 FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
+PARTWAY = (1.0, 0.3)  # shares of the way to where an effect fits best if all is proportional; it hardly ever is
+LITTLE = 1e-9  # relative damping, for numbers that do the same
 CHUNK = 24  # models simulated at once; bounds the memory
 
 Scan = Callable[[InnovationFitter, Fit, np.ndarray, str], np.ndarray]
@@ -47,7 +49,8 @@ class Candidate:
     Attributes:
         effect: Its name.
         gain: What adding it is expected to gain, in nats.
-        values: Where a fit should start, by "site/kind.symbol" [SI].
+        values: Its numbers where a fit should start, by "site/kind.symbol" [SI].
+        moved: All numbers, the others moved to suit the effect; and a part of the way there [SI].
         estimate: Its first number, were the effect proportional to it [SI].
         deviation: Standard deviation of that; infinite where the effect has a threshold.
     """
@@ -55,6 +58,7 @@ class Candidate:
     effect: str
     gain: float
     values: Mapping[str, float]
+    moved: tuple[Mapping[str, float], ...]
     estimate: float
     deviation: float
 
@@ -145,6 +149,7 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     for begin in range(0, len(atoms), CHUNK):
         part = atoms[begin : begin + CHUNK]
         change = fitter.white_of(fit, ModelBatch(model, names, part)) - base
+        beside = make_room(fit, change)
         change -= (change @ basis) @ basis.T
         slope, size = change @ left, np.sum(change**2, axis=1)
         for i, atom in enumerate(part):
@@ -157,7 +162,9 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
             estimate = neutral[0] + best * (atom[0] - neutral[0])
             deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
             start = dict(zip(names, values.tolist(), strict=True))
-            found.append(Candidate(name, float(gain), start, float(estimate), float(deviation)))
+            shares = PARTWAY if grown.all() and effect.non_smooth is None else (1.0,)
+            moved = tuple(_with_room(fit, s * dose * beside[i]) | _partway(start, effect, s) for s in shares)
+            found.append(Candidate(name, float(gain), start, moved, float(estimate), float(deviation)))
     return found
 
 
@@ -172,6 +179,7 @@ def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.
     neutral = np.array([p.neutral for p in effect.parameters])
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
     change = fitter.white_of(fit, ModelBatch(model, names, neutral + np.diag(steps))) - fit.white.ravel()
+    beside = make_room(fit, change)
     change -= (change @ basis) @ basis.T
     covariance = np.linalg.inv(change @ change.T + np.eye(len(steps)) / FURTHEST**2)
     slope = change @ left
@@ -179,7 +187,8 @@ def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.
     values = np.clip(neutral + amounts * steps, *_bounds(setting, name, effect))
     gain = -amounts @ slope - 0.5 * np.sum((amounts @ change) ** 2)
     start = dict(zip(names, values.tolist(), strict=True))
-    return Candidate(name, float(gain), start, float(values[0]), float(steps[0] * np.sqrt(covariance[0, 0])))
+    moved = (_with_room(fit, amounts @ beside) | start,)
+    return Candidate(name, float(gain), start, moved, float(values[0]), float(steps[0] * np.sqrt(covariance[0, 0])))
 
 
 def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
@@ -201,6 +210,30 @@ def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np
     scales = setting.scales[name.partition("/")[0]]
     sizes = np.array([scales.of(p.dimension) for p in effect.parameters])
     return np.array([p.low for p in effect.parameters]) * sizes, np.array([p.high for p in effect.parameters]) * sizes
+
+
+def _partway(start: Mapping[str, float], effect: Effect, share: float) -> dict[str, float]:
+    """Numbers a share of the way from where an effect does nothing."""
+    neutral = {name: effect.neutral[name.rpartition(".")[2]] for name in start}
+    return {name: neutral[name] + share * (value - neutral[name]) for name, value in start.items()}
+
+
+def _with_room(fit: Fit, step: np.ndarray) -> dict[str, float]:
+    """Numbers of a fit a step (D,) away [SI]."""
+    return fit.hypothesis.at(np.clip(fit.hypothesis.cube + step, 0.0, 1.0)).values
+
+
+def make_room(fit: Fit, changes: np.ndarray) -> np.ndarray:
+    """By how much a fit's numbers move to make up for changes (P, N) of its white errors, shape (P, D)."""
+    free = np.flatnonzero(fit.free)
+    moved = np.zeros((len(changes), len(fit.hypothesis.cube)))
+    if len(free):
+        normal = fit.information[np.ix_(free, free)]
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+        slopes = changes @ fit.jacobian[: fit.white.size, free]
+        damped = normal / np.outer(scale, scale) + LITTLE * np.eye(len(free))
+        moved[:, free] = -np.linalg.solve(damped, (slopes / scale).T).T / scale
+    return moved
 
 
 def basis_of(fit: Fit) -> np.ndarray:

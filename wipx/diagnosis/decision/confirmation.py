@@ -84,7 +84,9 @@ def confirmed_by_part(context: Context, search: Search, fit: Fit, *, small: bool
     return Chosen(search.joined(fit, tuple(chosen.fit for chosen in found)), considered)
 
 
-def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
+def confirmed(
+    context: Context, search: Search, fit: Fit, *, small: bool = False, seen: frozenset[frozenset[str]] = frozenset()
+) -> Chosen:
     """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
 
     Args:
@@ -92,9 +94,11 @@ def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False
         search: The search that chose the effects.
         fit: Of the effects.
         small: Whether small effects are kept that held-out predictions do not show.
+        seen: Sets of effects that were left already; an exchange does not lead back to them.
     """
     if not fit.effects:
         return Chosen(fit)
+    seen |= {frozenset(fit.effects)}
     repeated = transfer(context.fitter, fit)
     predicted = np.concatenate(context.judge.predict(fit.hypothesis.model, context.recordings))
     without = {effect: search.store.without(fit, effect) for effect in fit.effects}
@@ -117,17 +121,17 @@ def confirmed(context: Context, search: Search, fit: Fit, *, small: bool = False
         elif not small and gain < least and context.held_out.gain(repeated, reduced) < rules.visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
-            rival = _rival_that_transfers(context, search, fit, effect, repeated, gain)
+            rival = _rival_that_transfers(context, search, fit, effect, repeated, gain, seen)
             if rival is None:
                 continue
             reason = "held-out recordings contradict it, and not what is in its place"
             considered = (ConsideredEffect(effect, gain, False, reason),)
-            return confirmed(context, search, rival, small=small).after(considered)
+            return confirmed(context, search, rival, small=small, seen=seen).after(considered)
         considered = (ConsideredEffect(effect, gain, False, reason),)
         plain = search.store.with_reduced_law(fit, effect)
         worth = plain is not None and search.criteria.gains_enough(reduced, plain)
         kept = plain if plain is not None and worth else reduced
-        return confirmed(context, search, kept, small=small).after(considered)
+        return confirmed(context, search, kept, small=small, seen=seen).after(considered)
     return Chosen(fit)
 
 
@@ -150,7 +154,13 @@ def _uncertain(context: Context, search: Search, fit: Fit) -> list[str]:
 
 
 def _rival_that_transfers(
-    context: Context, search: Search, fit: Fit, effect: str, repeated: Transfer, gain: float
+    context: Context,
+    search: Search,
+    fit: Fit,
+    effect: str,
+    repeated: Transfer,
+    gain: float,
+    seen: frozenset[frozenset[str]],
 ) -> Fit | None:
     """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
     rules = context.rules.confirmation
@@ -158,7 +168,7 @@ def _rival_that_transfers(
         return None
     error = context.held_out.error(repeated)
     for other in search.store.replacements(fit, effect)[:RIVALS]:
-        if set(other.effects) != set(fit.effects) and evidence(other, fit) < rules.given_up * gain:
+        if frozenset(other.effects) not in seen and evidence(other, fit) < rules.given_up * gain:
             again = context.fitter.converged(context.fitter.fit(other.hypothesis, fit.levels))
             if context.held_out.error(transfer(context.fitter, again)) < (1.0 - rules.visible) * error:
                 return again
@@ -267,7 +277,7 @@ def _other_law(context: Context, search: Search, fit: Fit, worth: float) -> tupl
         if law is not None:
             effects, starts = law
             begins = [Hypothesis.of(context.setting, effects, start) for start in starts]
-            start = context.fitter.likeliest(begins, fit.levels, 1)[0]
+            start = context.fitter.ranked(begins, fit.levels)[0]
             found = context.fitter.converged(context.fitter.fit(start, fit.levels), rounds=2)
             gain = evidence(fit, found)
             taken = gain > most

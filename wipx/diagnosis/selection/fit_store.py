@@ -228,15 +228,30 @@ class FitStore:
         return self.side_by_side(self.fitter.stepped, climbs)
 
     def _starts(self, fit: Fit, candidates: list[Candidate]) -> list[Climb]:
-        """Where fits with one effect more begin: at the likeliest of its candidates."""
+        """Where fits with one effect more begin: at the likeliest of its candidates.
+
+        One of them, at least, begins where the other numbers have made room for the effect.
+        """
         name = candidates[0].effect
         own = [start.values for start in candidates] + unscaled(self.setting, name)
-        values = [{**others, **start} for others in nonsmooth_search.beside(fit, name) for start in own]
-        begins = [Hypothesis.of(self.setting, (*fit.effects, name), each) for each in values]
-        levels = self.fitter.spread_for(begins[0].model, fit.levels)
+        beside = nonsmooth_search.beside(fit, name)
+        alone = self._with(fit, name, [{**others, **start} for others in beside for start in own])
+        roomy = self._with(fit, name, [values for start in candidates for values in start.moved])
+        levels = self.fitter.spread_for(alone[0].model, fit.levels)
         count = 1 if self.is_of_part else STARTS
         if nonsmooth_search.is_drive_delay(name):
-            first = begins[:: len(own)]
-            begins += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, levels)]
+            first = alone[:: len(own)]
+            alone += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, levels)]
             count = nonsmooth_search.PEAKS
-        return [self.fitter.begun(begin, levels) for begin in self.fitter.likeliest(begins, levels, count)]
+        ranked = self.fitter.ranked([*roomy, *alone], levels)
+        chosen = ranked[:1] if count == 1 else _first_of(ranked, roomy, 1) + _first_of(ranked, alone, count - 1)
+        return [self.fitter.begun(begin, levels) for begin in chosen]
+
+    def _with(self, fit: Fit, effect: str, values: Sequence[Mapping[str, float]]) -> list[Hypothesis]:
+        """The effects of a fit and one more, at several values."""
+        return [Hypothesis.of(self.setting, (*fit.effects, effect), each) for each in values]
+
+
+def _first_of(ranked: list[Hypothesis], some: list[Hypothesis], count: int) -> list[Hypothesis]:
+    """The first few of some hypotheses in the order of all."""
+    return [each for each in ranked if any(each is one for one in some)][:count]
