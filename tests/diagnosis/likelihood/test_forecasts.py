@@ -1,6 +1,6 @@
 """Evidence of several horizons: its likelihood, and what it finds where forces wander."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.forecasts import ForecastFitter, PredictionStarts
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.fit_store import FitStore
@@ -133,22 +133,3 @@ def _faster(recording: Recording, factor: int) -> Recording:
     return Recording(
         recording.name, {name: np.interp(t, recording.t, values) for name, values in recording.columns.items()}
     )
-
-
-def test_a_fit_ends_where_it_would_with_slopes_taken_anew_for_numbers_in_doubt(fresh_seed: int):
-    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
-    fitter = forecasts(case)
-    base = fitter.first_fit(Hypothesis.of(fitter.doubted, (), {}))
-    start = Hypothesis.of(fitter.doubted, ("translation/coulomb",), {"translation/coulomb.F_c": 0.3})
-    exact = Anew(**{each.name: getattr(fitter, each.name) for each in fields(fitter)})
-    kept, taken = (each.converged(each.fit(start, base.levels)) for each in (fitter, exact))
-    assert kept.log_likelihood == pytest.approx(taken.log_likelihood, abs=0.5)
-    name = "translation/coulomb.F_c"
-    assert kept.hypothesis.values[name] == pytest.approx(taken.hypothesis.values[name], rel=0.01)
-
-
-class Anew(ForecastFitter):
-    """Forecasts that take all slopes anew."""
-
-    def _errors_around(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: PredictionStarts) -> np.ndarray:
-        return self._errors(hypothesis, cubes, levels)

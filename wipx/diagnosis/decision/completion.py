@@ -7,13 +7,7 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import evidence
-from wipx.diagnosis.selection.search import Chosen, Search
-from wipx.effects.catalogue import kind_of
-
-
-def is_everywhere(effect: str) -> bool:
-    """Whether every machine has a little of an effect "site/kind"."""
-    return bool(kind_of(effect).tolerance)
+from wipx.diagnosis.selection.search import Chosen, Search, is_everywhere
 
 
 def dominant(search: Search, fit: Fit) -> Chosen:

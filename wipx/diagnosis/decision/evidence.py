@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from wipx.diagnosis.decision.completion import completed, dominant, is_everywhere
+from wipx.diagnosis.decision.completion import completed, dominant
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -24,7 +24,7 @@ from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
-from wipx.diagnosis.selection.search import Chosen, Search
+from wipx.diagnosis.selection.search import Chosen, Search, is_everywhere
 
 Watcher = Callable[[str, float], None]
 Done = TypeVar("Done")
@@ -178,9 +178,10 @@ def _with_minor_effects(end: Found) -> Found:
     Small are those that remove little beside what no law describes. They stay in the completed model, unless no other
     is there.
     """
-    search, whole = _completed(end.search, end.rest.fit)
+    search, further = _completed_and_grown(end.search, end.rest.fit)
+    whole = further.fit
     kept = _by_part(search, whole, dominant)
-    considered = end.rest.considered + tuple(each for chosen in kept for each in chosen.considered)
+    considered = end.rest.considered + further.considered + tuple(each for chosen in kept for each in chosen.considered)
     named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
     if not named and end.rest.fit.effects:
         search, whole = _completed(end.search, end.search.nominal)
@@ -192,6 +193,18 @@ def _with_minor_effects(end: Found) -> Found:
     left, shapes = _left_over(context, search.nominal, Chosen(whole, considered))
     left = replace(left, significant=left.significant or end.rest.significant, minor=minor)
     return Found(context, search, left, shapes)
+
+
+def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
+    """The same with effects that show only beside such laws, which hide them otherwise."""
+    search, whole = _completed(search, fit)
+    if whole is fit:
+        return search, Chosen(fit)
+    further = search.grown(whole)
+    if set(further.fit.effects) == set(whole.effects):
+        return search, Chosen(whole, further.considered)
+    search, whole = _completed(search, further.fit)
+    return search, Chosen(whole, further.considered)
 
 
 def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:

@@ -351,7 +351,7 @@ class Fitter(ABC):
     def _sloped(self, hypothesis: Hypothesis, levels: Any, size: np.ndarray) -> Fit:
         """The values of a hypothesis as they are, with slopes over steps of the position in the cube, shape (D,)."""
         cubes = _around(hypothesis.cube, size)
-        errors = self._errors_around(hypothesis, cubes, levels)
+        errors = self._errors(hypothesis, cubes, levels)
         fit = self._likeliest(hypothesis, levels, cubes[:1], errors[:1])
         white = self.whitened(errors, fit.noise).reshape(len(cubes), -1)
         rows = np.concatenate([white, hypothesis.space.prior_residuals(cubes)], axis=1)
@@ -364,10 +364,6 @@ class Fitter(ABC):
 
     def _errors(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: Any) -> np.ndarray:
         return self.errors_of(hypothesis.space.batch(cubes), levels, hypothesis.model)
-
-    def _errors_around(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: Any) -> np.ndarray:
-        """Errors at a position in the cube and a step from it along each axis, shape (D + 1, ...)."""
-        return self._errors(hypothesis, cubes, levels)
 
     def _likeliest(self, hypothesis: Hypothesis, levels: Any, cubes: np.ndarray, errors: np.ndarray) -> Fit:
         """The likeliest of several positions in the cube by their errors (P, ...), without slopes."""

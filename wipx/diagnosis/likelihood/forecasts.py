@@ -35,7 +35,6 @@ from wipx.sim.analytic import AnalyticSimulator
 
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
 DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are fitted
-CLOSE = 1e-3  # of a number's interval; slopes over shorter steps are not kept, since kinks may spoil them
 STEPS = (1.0, 0.3, 0.0)  # shares of the step to numbers that suit others, of which the best is taken
 STEP = 2.0  # times the simulator's usual step, exact enough where no law is
 
@@ -94,9 +93,6 @@ class ForecastFitter(Fitter):
     doubted: Setting
     _doubts: dict[tuple[tuple[str, ...], bytes], np.ndarray] = field(default_factory=dict, compare=False, repr=False)
     _seen: dict[tuple[tuple[str, ...], bytes], Fit] = field(default_factory=dict, compare=False, repr=False)
-    _slopes: dict[int, tuple[PredictionStarts, dict[str, np.ndarray]]] = field(
-        default_factory=dict, compare=False, repr=False
-    )
 
     @property
     def rules(self) -> Rules:
@@ -169,15 +165,15 @@ class ForecastFitter(Fitter):
 
     def refined(self) -> "ForecastFitter":
         """The same with half the step of the simulator."""
-        return replace(self, by_row=self.by_row.refined(), _doubts={}, _seen={}, _slopes={})
+        return replace(self, by_row=self.by_row.refined(), _doubts={}, _seen={})
 
     def without(self, *recordings: int) -> "ForecastFitter":
         """The same with recordings that do not count."""
-        return replace(self, by_row=self.by_row.without(*recordings), _doubts={}, _seen={}, _slopes={})
+        return replace(self, by_row=self.by_row.without(*recordings), _doubts={}, _seen={})
 
     def beside(self, setting: Setting) -> "ForecastFitter":
         """The same, with doubt of the part's own numbers."""
-        return replace(self, doubted=setting.doubted(self.rules.forecasts.undeclared), _doubts={}, _seen={}, _slopes={})
+        return replace(self, doubted=setting.doubted(self.rules.forecasts.undeclared), _doubts={}, _seen={})
 
     def first_fit(self, hypothesis: Hypothesis, levels: PredictionStarts | None = None) -> Fit:
         """From starts of its own."""
@@ -347,24 +343,6 @@ class ForecastFitter(Fitter):
     def errors_of(self, batch: ModelBatch, levels: PredictionStarts, model: Model) -> np.ndarray:
         """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
         return self.predictions.errors(batch, [levels.filter])
-
-    def _errors_around(self, hypothesis: Hypothesis, cubes: np.ndarray, levels: PredictionStarts) -> np.ndarray:
-        """As in `Fitter`; numbers in doubt, which hardly move, keep the slopes that were taken at these levels."""
-        names, values = hypothesis.space.names, hypothesis.space.to_values(cubes)
-        steps = {n: float(values[i + 1, i] - values[0, i]) for i, n in enumerate(names) if n in self.doubted.doubts}
-        slopes = self._slopes[id(levels)][1] if id(levels) in self._slopes else {}
-        known = [i for i, name in enumerate(names, 1) if name in steps and name in slopes]
-        simulated = np.setdiff1d(np.arange(len(cubes)), known)
-        some = self._errors(hypothesis, cubes[simulated], levels)
-        errors = np.empty((len(cubes), *some.shape[1:]))
-        errors[simulated] = some
-        for i in known:
-            errors[i] = errors[0] + slopes[names[i - 1]] * steps[names[i - 1]]
-        apart = np.abs(np.diag(cubes[1:] - cubes[0]))
-        if steps and not known and apart[[names.index(name) for name in steps]].min() > CLOSE:
-            taken = {name: (errors[names.index(name) + 1] - errors[0]) / step for name, step in steps.items()}
-            self._slopes[id(levels)] = (levels, taken)
-        return errors
 
     def noise_of(self, errors: np.ndarray, levels: PredictionStarts | None, model: Model) -> list[Errors]:
         """How each model's errors are distributed, those of each group of joints by themselves."""

@@ -41,7 +41,6 @@ class Setting:
         forces_count: Whether that is the prior of these numbers.
         tolerances: Laws that every machine follows a little, by "site/kind", with the numbers that no prior holds.
         everywhere: Whether all of them act, beside the effects of a hypothesis.
-        doubts: Numbers that are given as exact, and may be slightly wrong.
     """
 
     nominal: Model
@@ -52,7 +51,6 @@ class Setting:
     forces_count: bool = False
     tolerances: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     everywhere: bool = False
-    doubts: frozenset[str] = frozenset()
 
     @property
     def asked_for(self) -> dict[str, float]:
@@ -122,8 +120,7 @@ class Setting:
         if plant.tree is not None:
             known = {name: value for name, value in known.items() if self._is_of_these_sites(name.partition(".")[0])}
         sizes = {name: self._size(name) if plant.parameters[name].absolute else 1.0 for name in known}
-        uncertainty = {**{n: deviation * s for n, s in sizes.items()}, **self.uncertainty}
-        return replace(self, uncertainty=uncertainty, doubts=frozenset(known.keys() - self.uncertainty.keys()))
+        return replace(self, uncertainty={**{n: deviation * s for n, s in sizes.items()}, **self.uncertainty})
 
     def _is_of_these_sites(self, owner: str) -> bool:
         """Whether a joint or a link of a tree is among the sites at which effects are looked for."""

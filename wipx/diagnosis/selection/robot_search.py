@@ -22,7 +22,7 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search
+from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search, named_effects
 from wipx.effects.catalogue import effect_of
 
 TRIED = 3  # weakest effects of the whole robot, without which it is fitted
@@ -228,7 +228,7 @@ class RobotSearch(Search):
 
     def pruned(self, fit: Fit) -> Chosen:
         """Without the effects that those of other parts make superfluous, looked for among the weakest ones."""
-        losses = {effect: expected_loss(fit, effect) for effect in fit.effects} if len(fit.effects) > 1 else {}
+        losses = {effect: expected_loss(fit, effect) for effect in named_effects(fit)} if len(fit.effects) > 1 else {}
         doubted = [each for each in losses if losses[each] < DOUBTED * self.criteria.most_required(fit, each)]
         for effect in sorted(doubted, key=lambda effect: losses[effect])[:TRIED]:
             smaller = self.store.without(fit, effect)

@@ -172,7 +172,7 @@ class Search:
 
     def pruned(self, fit: Fit) -> Chosen:
         """Without the effects that the latest one made superfluous."""
-        for effect in fit.effects if len(fit.effects) > 1 else ():
+        for effect in named_effects(fit) if len(fit.effects) > 1 else ():
             smaller = self.store.without(fit, effect)
             if evidence(smaller, fit) < DOUBTED * self.criteria.required_gain(smaller, fit):
                 smaller = self.store.searched_by_trial(smaller)
@@ -187,7 +187,7 @@ class Search:
         considered: History = ()
         for _ in range(self.exchanges):
             best, most = fit, self.rules.least_lead
-            for base, found in self.store.side_by_side(partial(self._replaced, fit), fit.effects):
+            for base, found in self.store.side_by_side(partial(self._replaced, fit), named_effects(fit)):
                 lead = most if found is None else self.criteria.lead(found, fit)
                 if found is not None and lead > most and self.criteria.gains_enough(base, found):
                     best, most = found, lead
@@ -247,7 +247,7 @@ class Search:
         for found in self._in_one_law(fit):
             if self.criteria.score_lead(fit, found) < self.rules.least_lead:
                 return Chosen(found)
-        for effect in fit.effects if len(fit.effects) > 1 else ():
+        for effect in named_effects(fit) if len(fit.effects) > 1 else ():
             for found in self.store.replacements(fit, effect):
                 if (
                     set(found.effects) == set(fit.effects)
@@ -268,6 +268,16 @@ class Search:
                 if fitter.looks_for(law, effect_of(law, plant)):
                     rest = tuple(other for other in fit.effects if other not in (effect, constant))
                     yield self.store.escaped(self.store.fitted((*rest, law), fit))
+
+
+def is_everywhere(effect: str) -> bool:
+    """Whether every machine has a little of an effect "site/kind"."""
+    return bool(kind_of(effect).tolerance)
+
+
+def named_effects(fit: Fit) -> tuple[str, ...]:
+    """Effects of a fit without those that every machine has a little of: these stay as they are."""
+    return tuple(effect for effect in fit.effects if not is_everywhere(effect))
 
 
 def _step(current: Fit, extended: list[Fit], chosen: Fit | None, fleeting: set[frozenset[str]]) -> History:
