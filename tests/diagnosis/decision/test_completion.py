@@ -10,7 +10,7 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.search import Search
+from wipx.diagnosis.selection.search import Search, named_effects
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 SAG = {"actuator/sag": {"d": 0.03, "l": 0.1, "t_0": 1.5, "u_0": 1.0}}
@@ -59,6 +59,22 @@ def test_a_drive_that_does_not_sag_does_not_in_the_completed_model(fresh_seed: i
     friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
     knowing = search.knowing(tolerances(case.setting, fitter, fitter.predictions, friction))
     assert completed(knowing, friction) is friction
+
+
+def test_a_search_goes_on_beside_a_sag_and_leaves_it_in_place(fresh_seed: int):
+    hidden = {**FRICTION, **SAG, "translation/viscous": {"sigma": 2.0}}
+    case = shaken(bench("linear_axis", hidden, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    search, fitter = search_of(case), forecasts(case)
+    friction = fitter.first_fit(Hypothesis.of(case.setting, ("translation/coulomb",), {}))
+    knowing = search.knowing(tolerances(case.setting, fitter, fitter.predictions, friction))
+    sagging = fitter.converged(fitter.fit(_with_sag(knowing, friction), friction.levels))
+    more = knowing.grown(knowing.store.keep(sagging)).fit
+    assert len(named_effects(more)) > len(friction.effects)
+    assert "actuator/sag" in more.effects
+
+
+def _with_sag(search: Search, fit: Fit) -> Hypothesis:
+    return Hypothesis.of(search.store.setting, (*fit.effects, "actuator/sag"), fit.hypothesis.values)
 
 
 @pytest.mark.slow
