@@ -5,9 +5,10 @@ import numpy as np
 from wipx.core.diagnosis import ConsideredEffect
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
+from wipx.diagnosis.likelihood.held_out import HeldOut, transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import evidence
-from wipx.diagnosis.selection.search import Chosen, Search, is_everywhere
+from wipx.diagnosis.selection.search import Chosen, Search, is_everywhere, named_effects
 
 
 def dominant(search: Search, fit: Fit) -> Chosen:
@@ -29,6 +30,26 @@ def dominant(search: Search, fit: Fit) -> Chosen:
         gain = evidence(without[least], kept)
         considered += (ConsideredEffect(least, gain, False, "removes little of the error beside what stays"),)
         kept = search.store.restarted(without[least])
+    return Chosen(kept, considered)
+
+
+def transferring(held_out: HeldOut, search: Search, fit: Fit) -> Chosen:
+    """Without effects that make predictions worse of recordings which they were not fitted to, the worst one first.
+
+    Stretches of time do not tell that: what one recording has of its own is in all of its stretches.
+    """
+    fitter = search.store.fitter
+    kept, considered = fit, ()
+    while named := named_effects(kept):
+        repeated = transfer(fitter, kept)
+        without = {effect: search.store.without(kept, effect) for effect in named}
+        gains = {effect: held_out.gain(repeated, smaller) for effect, smaller in without.items()}
+        worst = min(gains, key=lambda effect: gains[effect])
+        if gains[worst] >= -fitter.rules.confirmation.tolerated:
+            break
+        gain = evidence(without[worst], kept)
+        considered += (ConsideredEffect(worst, gain, False, "predicts held-out recordings worse"),)
+        kept = search.store.restarted(without[worst])
     return Chosen(kept, considered)
 
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from wipx.diagnosis.decision.completion import completed, dominant
+from wipx.diagnosis.decision.completion import completed, dominant, transferring
 from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -179,6 +179,7 @@ def _with_minor_effects(end: Found) -> Found:
     is there.
     """
     search, further = _completed_and_grown(end.search, end.rest.fit)
+    further = _without_harm(end.context, search, further)
     whole = further.fit
     kept = _by_part(search, whole, dominant)
     considered = end.rest.considered + further.considered + tuple(each for chosen in kept for each in chosen.considered)
@@ -205,6 +206,15 @@ def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
         return search, Chosen(whole, further.considered)
     search, whole = _completed(search, further.fit)
     return search, Chosen(whole, further.considered)
+
+
+def _without_harm(context: Context, search: Search, chosen: Chosen) -> Chosen:
+    """Without effects that make predictions of held-out recordings worse."""
+    fit = chosen.fit
+    kept = _by_part(search, fit, lambda part, own: transferring(context.held_out, part, own))
+    considered = chosen.considered + tuple(each for one in kept for each in one.considered)
+    changed = any(one.fit is not own for one, (_, own) in zip(kept, search.split(fit), strict=True))
+    return Chosen(search.joined(fit, tuple(one.fit for one in kept)) if changed else fit, considered)
 
 
 def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:
