@@ -1,14 +1,18 @@
 """What is named of the effects that forecasts find, and what the completed model has beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
 
-from wipx.diagnosis.decision.completion import completed, dominant
+from wipx.diagnosis.decision.completion import completed, dominant, transferring
+from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
+from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search, named_effects
 
@@ -38,6 +42,20 @@ def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPa
     assert without[0] / stays[0] > 1.0 + fitter.rules.forecasts.least_removed
     monkeypatch.setattr(Setting, "expects", lambda self, effect: effect == "environment/spring")
     assert dominant(search, more).fit is more  # recorded forces show it as well
+
+
+def test_what_one_recording_has_of_its_own_is_no_law_of_the_machine(fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    first, *others = case.recordings
+    pulled = replace(first, columns={**first.columns, "u": first["u"] + 1.0})  # that its log does not know of
+    case = replace(case, recordings=(pulled, *others))
+    search, fitter = search_of(case), forecasts(case)
+    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    start = Hypothesis.of(case.setting, ("translation/coulomb", "actuator/offset"), {})
+    both = search.store.keep(fitter.first_fit(start))
+    kept = transferring(context.held_out, search, both)
+    assert kept.fit.effects == ("translation/coulomb",)
+    assert [each.reason for each in kept.considered] == ["predicts held-out recordings worse"]
 
 
 def test_a_drive_that_sags_sags_in_the_completed_model_and_makes_it_predict_better(fresh_seed: int):
