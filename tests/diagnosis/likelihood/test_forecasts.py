@@ -133,3 +133,20 @@ def _faster(recording: Recording, factor: int) -> Recording:
     return Recording(
         recording.name, {name: np.interp(t, recording.t, values) for name, values in recording.columns.items()}
     )
+
+
+@pytest.mark.parametrize("hidden", ["actuator/delay", "sensor_theta/delay"])
+def test_a_late_drive_and_a_late_sensor_of_one_joint_are_one(hidden: str, fresh_seed: int):
+    case = shaken(
+        bench("pendulum", {hidden: {"tau": 0.015}}, fresh_seed, count=4, duration=4.0),
+        np.random.default_rng(fresh_seed),
+    )
+    fitter = forecasts(case)
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    store = replace(FitStore.of(fitter, case.setting, nominal), elsewhere=fitter.alike)
+    drive, sensor = (store.fitted((name,), nominal) for name in ("actuator/delay", "sensor_theta/delay"))
+    for fit in (drive, sensor):
+        assert fit.hypothesis.cube == pytest.approx(drive.hypothesis.cube, abs=0.02)
+    assert _separation(fitter, drive, sensor) == _separation(fitter, sensor, drive) == 0.0
+    assert any(other.effects == sensor.effects for other in store.replacements(drive, "actuator/delay"))
+    assert _separation(fitter, drive, store.fitted(("pitch/viscous",), nominal)) > 0.0
