@@ -100,7 +100,7 @@ def diagnose(
     by_forces = numbers_by_forces(robot.nominal, halves) if robot.nominal.plant.tree is not None else {}
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves), by_forces=by_forces)
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    context = Context.of(halves, setting, simulator, rules)
+    context = replace(Context.of(halves, setting, simulator, rules), several=len(recordings) > 1)
     watcher("noise of the nominal model", 0.02)
     nominal = context.by_row.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
     if setting.nominal.plant.tree is not None and robot.feedback is None:

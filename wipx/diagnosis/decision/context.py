@@ -33,6 +33,7 @@ class Context:
         first_levels: A first guess of the noise.
         judge: Predicts recordings.
         recordings: Of the robot.
+        several: Whether they are runs of their own, not halves of one.
     """
 
     fitter: Fitter
@@ -41,6 +42,7 @@ class Context:
     first_levels: NoiseLevels
     judge: Judge
     recordings: tuple[Recording, ...]
+    several: bool = True
 
     @classmethod
     def of(

@@ -209,8 +209,10 @@ def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
 
 
 def _without_harm(context: Context, search: Search, chosen: Chosen) -> Chosen:
-    """Without effects that make predictions of held-out recordings worse."""
+    """Without effects that make predictions of held-out recordings worse; halves of one run may differ too much."""
     fit = chosen.fit
+    if not context.several:
+        return chosen
     kept = _by_part(search, fit, lambda part, own: transferring(context.held_out, part, own))
     considered = chosen.considered + tuple(each for one in kept for each in one.considered)
     changed = any(one.fit is not own for one, (_, own) in zip(kept, search.split(fit), strict=True))
