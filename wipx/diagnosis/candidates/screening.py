@@ -149,7 +149,7 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     for begin in range(0, len(atoms), CHUNK):
         part = atoms[begin : begin + CHUNK]
         change = fitter.white_of(fit, ModelBatch(model, names, part)) - base
-        beside = make_room(fit, change)
+        beside = _make_room(fit, change)
         change -= (change @ basis) @ basis.T
         slope, size = change @ left, np.sum(change**2, axis=1)
         for i, atom in enumerate(part):
@@ -179,7 +179,7 @@ def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.
     neutral = np.array([p.neutral for p in effect.parameters])
     model = fit.hypothesis.model.with_effects({name: effect.neutral})
     change = fitter.white_of(fit, ModelBatch(model, names, neutral + np.diag(steps))) - fit.white.ravel()
-    beside = make_room(fit, change)
+    beside = _make_room(fit, change)
     change -= (change @ basis) @ basis.T
     covariance = np.linalg.inv(change @ change.T + np.eye(len(steps)) / FURTHEST**2)
     slope = change @ left
@@ -223,7 +223,7 @@ def _with_room(fit: Fit, step: np.ndarray) -> dict[str, float]:
     return fit.hypothesis.at(np.clip(fit.hypothesis.cube + step, 0.0, 1.0)).values
 
 
-def make_room(fit: Fit, changes: np.ndarray) -> np.ndarray:
+def _make_room(fit: Fit, changes: np.ndarray) -> np.ndarray:
     """By how much a fit's numbers move to make up for changes (P, N) of its white errors, shape (P, D)."""
     free = np.flatnonzero(fit.free)
     moved = np.zeros((len(changes), len(fit.hypothesis.cube)))

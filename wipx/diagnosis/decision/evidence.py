@@ -197,7 +197,7 @@ def _with_minor_effects(end: Found) -> Found:
 
 
 def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
-    """The same with effects that show only beside such laws, which hide them otherwise."""
+    """A fit with the laws that every machine follows a little, and with further effects that show beside them only."""
     search, whole = _completed(search, fit)
     if whole is fit:
         return search, Chosen(fit)
