@@ -17,7 +17,7 @@ from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
 from wipx.diagnosis.candidates.loose_drive_scan import plays, springs
 from wipx.diagnosis.candidates.point_mass_scan import point_masses
 from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
-from wipx.diagnosis.likelihood.fitting import Fit, Fitter
+from wipx.diagnosis.likelihood.fitting import Fit, Fitter, damped_step
 from wipx.diagnosis.likelihood.hypothesis import Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.effects.catalogue import vocabulary
@@ -25,7 +25,6 @@ from wipx.effects.catalogue import vocabulary
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
 FAINTEST = 1e-12  # squared change of the innovations below which a dose does nothing but round
 PARTWAY = (1.0, 0.3)  # shares of the way to where an effect fits best if all is proportional; it hardly ever is
-LITTLE = 1e-9  # relative damping, for numbers that do the same
 CHUNK = 24  # models simulated at once; bounds the memory
 
 Scan = Callable[[InnovationFitter, Fit, np.ndarray, str], np.ndarray]
@@ -228,11 +227,8 @@ def _make_room(fit: Fit, changes: np.ndarray) -> np.ndarray:
     free = np.flatnonzero(fit.free)
     moved = np.zeros((len(changes), len(fit.hypothesis.cube)))
     if len(free):
-        normal = fit.information[np.ix_(free, free)]
-        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
         slopes = changes @ fit.jacobian[: fit.white.size, free]
-        damped = normal / np.outer(scale, scale) + LITTLE * np.eye(len(free))
-        moved[:, free] = -np.linalg.solve(damped, (slopes / scale).T).T / scale
+        moved[:, free] = damped_step(fit.information[np.ix_(free, free)], slopes.T).T
     return moved
 
 

@@ -384,13 +384,22 @@ class Fitter(ABC):
         proposals = np.repeat(cube[None], len(DAMPINGS), axis=0)
         if not len(free):
             return proposals[:1]
-        normal = fit.information[np.ix_(free, free)]
-        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12))
-        scaled = normal / np.outer(scale, scale)
         for i, damping in enumerate(DAMPINGS):
-            step = np.linalg.solve(scaled + (damping + 1e-9) * np.eye(len(free)), fit.slope[free] / scale) / scale
-            proposals[i, free] -= step
+            proposals[i, free] += damped_step(fit.information[np.ix_(free, free)], fit.slope[free], damping)
         return np.clip(proposals, 0.0, 1.0)
+
+
+def damped_step(information: np.ndarray, slope: np.ndarray, damping: float = 0.0) -> np.ndarray:
+    """The step to where a parabola is least, shortened by a relative damping (Levenberg-Marquardt).
+
+    Args:
+        information: Curvature, shape (D, D).
+        slope: Shape (D,), or (D, K) for K steps at once.
+        damping: Relative to the curvature along each axis; a little is always there, for numbers that do the same.
+    """
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
+    scaled = information / np.outer(scale, scale) + (damping + 1e-9) * np.eye(len(scale))
+    return -(np.linalg.solve(scaled, (slope.T / scale).T).T / scale).T
 
 
 def _secants(fit: Fit) -> np.ndarray:
