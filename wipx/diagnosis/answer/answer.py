@@ -156,7 +156,7 @@ def _effects_of_part(
                 tuple(rival.name for rival in rivals if rival.separation < context.rules.answer.told_apart),
                 rivals,
                 max(evidence(reduced, fit), 0.0),
-                context.held_out.gain(repeated, reduced),
+                context.held_out.gain(context.fitter, repeated, reduced),
                 probability,
                 0.0,
                 law_curve(*context.fitter.seen_by_row(fit), effect, shapes),
@@ -167,14 +167,17 @@ def _effects_of_part(
 
 
 def _rivals(context: Context, search: Search, fit: Fit, effect: str) -> tuple[tuple[Alternative, ...], float]:
-    """Effects that could stand in the place of one, the closest first, and the probability of its name."""
+    """Effects that could stand in the place of one, the closest first, and the probability of its name.
+
+    A richer law of the same physics could where it explains more, though not so much that it is told apart.
+    """
     overstated = inflation(fit, fit.hypothesis.parameters_of(effect))
     rivals, weights = [], []
     rest = set(fit.effects) - {effect}
     base = search.store.reduced(fit, effect)
     for other in search.store.replacements(fit, effect):
         name = next(iter(set(other.effects) - rest), effect)
-        if name == effect or _is_richer(other, name, effect, context.data):
+        if name == effect or (_is_richer(other, name, effect, context.data) and score(other, base) <= score(fit, base)):
             continue
         starts = _starts(context, fit, other, effect, name)
         start = context.fitter.ranked(starts, fit.levels)[0]
@@ -206,7 +209,7 @@ def _starts(context: Context, fit: Fit, rival: Fit, effect: str, name: str) -> l
 
 
 def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool:
-    """Whether a rival is the same law with more to it that is not needed."""
+    """Whether a rival is the same law with more to it."""
     replaced = reduced_effects(other, data)
     return simple_law(name) == effect or (replaced is not None and effect in replaced)
 

@@ -123,7 +123,7 @@ class _Asked:
             parameters=tuple(e for e in numbers if e.name.startswith(f"{self.name}.")),
             log_evidence_gain=evidence(base, free),
             required_gain=search.criteria.required_gain(base, free),
-            heldout_gain=context.held_out.gain(repeated, base),
+            heldout_gain=context.held_out.gain(context.fitter, repeated, base),
             transfers=bool(repeated.likelihoods.sum() > known.sum()),
             loss=0.0 if named else -evidence(best, free),
             size=None,

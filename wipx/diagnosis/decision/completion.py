@@ -43,7 +43,7 @@ def transferring(held_out: HeldOut, search: Search, fit: Fit) -> Chosen:
     while named := named_effects(kept):
         repeated = transfer(fitter, kept)
         without = {effect: search.store.without(kept, effect) for effect in named}
-        gains = {effect: held_out.gain(repeated, smaller) for effect, smaller in without.items()}
+        gains = {effect: held_out.gain(fitter, repeated, smaller) for effect, smaller in without.items()}
         worst = min(gains, key=lambda effect: gains[effect])
         if gains[worst] >= -fitter.rules.confirmation.tolerated:
             break

@@ -118,7 +118,7 @@ def confirmed(
             reason = "has a size that cannot be told from zero"
         elif gain < rules.doubtful and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif not small and gain < least and context.held_out.gain(repeated, reduced) < rules.visible:
+        elif not small and gain < least and context.held_out.gain(context.fitter, repeated, reduced) < rules.visible:
             reason = f"does not show in held-out predictions beside {leading}"
         else:
             rival = _rival_that_transfers(context, search, fit, effect, repeated, gain, seen)
@@ -164,7 +164,7 @@ def _rival_that_transfers(
 ) -> Fit | None:
     """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
     rules = context.rules.confirmation
-    if context.held_out.gain(repeated, search.store.without(fit, effect)) >= -rules.tolerated:
+    if context.held_out.gain(context.fitter, repeated, search.store.without(fit, effect)) >= -rules.tolerated:
         return None
     error = context.held_out.error(repeated)
     for other in search.store.replacements(fit, effect)[:RIVALS]:

@@ -41,12 +41,23 @@ class HeldOut:
 
     def transfers(self, fitter: Fitter, smaller: Fit, larger: Fit) -> bool:
         """Whether a fit with more effects predicts held-out recordings about as well as one with fewer."""
-        return self.gain(transfer(fitter, larger), smaller) > -fitter.rules.confirmation.tolerated
+        return self.gain(fitter, transfer(fitter, larger), smaller) > -fitter.rules.confirmation.tolerated
 
-    def gain(self, repeated: Transfer, reduced: Fit) -> float:
-        """Share of the squared prediction error that an effect removes from recordings it was not fitted to."""
+    def gain(self, fitter: Fitter, repeated: Transfer, reduced: Fit) -> float:
+        """Share of the squared prediction error that an effect removes from recordings it was not fitted to.
+
+        The fit without it knows these recordings, and loses against it all the same, or is repeated without them too.
+
+        Args:
+            fitter: Of both.
+            repeated: The fit with the effect.
+            reduced: The fit without it.
+        """
+        after = self.error(repeated)
         before = self._squared_error(self.judge.predict(reduced.hypothesis.model, self.recordings), repeated)
-        return 1.0 - self.error(repeated) / before if before > 0.0 else 0.0
+        if after > before:
+            before = self.error(transfer(fitter, reduced))
+        return 1.0 - after / before if before > 0.0 else 0.0
 
     def error(self, repeated: Transfer) -> float:
         """Sum of the squared prediction errors, in units of the sensor noise, on recordings left out of the fit."""
