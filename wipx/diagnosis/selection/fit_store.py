@@ -5,7 +5,7 @@ What is preferred is decided elsewhere (`criteria`, `search`).
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,23 @@ STARTS = 2  # and those from which it is fitted
 WORTH_TRIALS = 0.25  # of the best score, from which a rough effect is searched by trial; all that won so had half
 FITTED_TO_THE_END = 3  # effects for which they are, at most
 CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where fits with one effect more begin.
+
+    Attributes:
+        effect: Its name.
+        hypotheses: With it, each at the numbers of a start.
+        levels: Held fixed in the fits.
+        log_likelihood: Of the likeliest of them.
+    """
+
+    effect: str
+    hypotheses: list[Hypothesis]
+    levels: Any
+    log_likelihood: float
 
 
 @dataclass(frozen=True)
@@ -184,7 +201,9 @@ class FitStore:
     def _started(self, base: Fit, effect: str) -> Fit | None:
         """A fit with one effect more that starts from where the others leave it room; None where they leave none."""
         starts = sorted(candidates_of_effect(self.fitter, self.setting, base, effect), key=lambda start: -start.gain)
-        return self.fitter.converged(self._raced(base, [starts[:LOOKED_AT]])[0]) if starts else None
+        if not starts:
+            return None
+        return self.fitter.converged(self._raced(base, [self._starts(base, starts[:LOOKED_AT])])[0])
 
     def _extended(self, fit: Fit) -> list[Fit]:
         ranked = self.candidates_for(fit)
@@ -197,9 +216,11 @@ class FitStore:
         if self.is_of_part:
             least = max(least, self.least_expected(fit), self.fitter.rules.selection.expected_share * best)
         most = min(self.fitter.considered, CONSIDERED_IN_PART) if self.is_of_part else self.fitter.considered
-        leading = [name for name in by_effect if by_effect[name][0].gain >= least][:most]
-        leading += [name for name in by_effect if nonsmooth_search.hides(fit, name) and name not in leading]
-        fits = self._raced(fit, [by_effect[name][:LOOKED_AT] for name in leading])
+        hidden = [name for name in by_effect if nonsmooth_search.hides(fit, name)]
+        names = [name for name in by_effect if by_effect[name][0].gain >= least or name in hidden]
+        begun = self.side_by_side(lambda name: self._starts(fit, by_effect[name][:LOOKED_AT]), names)
+        begun.sort(key=lambda start: -start.log_likelihood)
+        fits = self._raced(fit, begun[:most] + [start for start in begun[most:] if start.effect in hidden])
         fits.sort(key=lambda f: -score(f, fit))
         least = race.CLOSE * max((evidence(fit, f) for f in fits), default=0.0)
         close = [f for f in fits[:FITTED_TO_THE_END] if evidence(fit, f) >= least]
@@ -210,10 +231,9 @@ class FitStore:
             self._fits.setdefault(frozenset(end.effects), end)
         return sorted([*ends, *rest], key=lambda f: -score(f, fit))
 
-    def _raced(self, fit: Fit, candidates: Sequence[list[Candidate]]) -> list[Fit]:
+    def _raced(self, fit: Fit, starts: Sequence[Starts]) -> list[Fit]:
         """The best fit with each of some effects more, as far as it is worth following."""
-        starts = self.side_by_side(lambda own: self._starts(fit, own), candidates)
-        fits = race.run(self._stepped, fit, starts, self.fitter.steps)
+        fits = race.run(self._stepped, fit, self.side_by_side(self._begun, starts), self.fitter.steps)
         least = race.least_score([each for own in fits for each in own], fit, WORTH_TRIALS)
 
         def searched(each: Fit) -> Fit:
@@ -227,7 +247,7 @@ class FitStore:
         """Fits on their way, one step further each."""
         return self.side_by_side(self.fitter.stepped, climbs)
 
-    def _starts(self, fit: Fit, candidates: list[Candidate]) -> list[Climb]:
+    def _starts(self, fit: Fit, candidates: list[Candidate]) -> Starts:
         """Where fits with one effect more begin: at the likeliest of its candidates.
 
         One of them, at least, begins where the other numbers have made room for the effect.
@@ -243,9 +263,14 @@ class FitStore:
             first = alone[:: len(own)]
             alone += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, levels)]
             count = nonsmooth_search.PEAKS
-        ranked = self.fitter.ranked([*roomy, *alone], levels)
+        every = [*roomy, *alone]
+        likelihoods = self.fitter.likelihoods_of(every, levels)
+        ranked = [every[i] for i in np.argsort(-likelihoods)]
         chosen = ranked[:1] if count == 1 else _first_of(ranked, roomy, 1) + _first_of(ranked, alone, count - 1)
-        return [self.fitter.begun(begin, levels) for begin in chosen]
+        return Starts(name, chosen, levels, float(likelihoods.max()))
+
+    def _begun(self, starts: Starts) -> list[Climb]:
+        return [self.fitter.begun(begin, starts.levels) for begin in starts.hypotheses]
 
     def _with(self, fit: Fit, effect: str, values: Sequence[Mapping[str, float]]) -> list[Hypothesis]:
         """The effects of a fit and one more, at several values."""
