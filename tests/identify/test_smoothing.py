@@ -11,10 +11,9 @@ from identify.stiff_arm import ENGINE, NOISE, motion, stiff_arm
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.identify.evaluation import Judge
-from wipx.identify.kalman import Places
 from wipx.identify.noise import sensor_noise
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
-from wipx.identify.starts import leads_of, starts_by
+from wipx.identify.starts import starts_by
 from wipx.identify.windows import LOOK_AHEAD, cut
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
@@ -60,7 +59,7 @@ def test_models_that_are_followed_together_have_the_states_of_each_alone(fresh_s
     recordings = recorded("wip", {}, fresh_seed)
     smoother = Smoother(SIMULATOR, model.plant, recordings, sensor_noise(recordings, model.plant))
     windows = cut(recordings, model.plant, horizon=0.5, lead=0.1)
-    one = [smoother.filtered(model, np.full(2, 10.0), leads_of(windows))]
+    one = [smoother.filtered(model, np.full(2, 10.0))]
     names, values = ("actuator/gain.k", "sensor_theta/scale.e"), np.array([[0.8, 0.0], [1.1, 0.03]])
     together = starts_by(smoother, windows, ModelBatch(model, names, values), one).states
     for p, each in enumerate(values):
@@ -78,9 +77,7 @@ def test_states_that_lead_to_a_start_use_what_it_may_see_and_nothing_later(kind:
     def led(one: Recording):
         smoother = Smoother(SIMULATOR, model.plant, (one,), noise)
         windows = cut((one,), model.plant, horizon=0.5, lead=0.1)
-        starts = starts_by(
-            smoother, windows, ModelBatch(model), [smoother.filtered(model, bandwidth, leads_of(windows))]
-        )
+        starts = starts_by(smoother, windows, ModelBatch(model), [smoother.filtered(model, bandwidth)])
         return windows, starts, smoother.along(model, bandwidth)[..., 0]
 
     windows, starts, along = led(recording)
@@ -112,9 +109,9 @@ def error_over_claim(model: Model, recording: Recording, true: np.ndarray, noise
     smoother = Smoother(ENGINE, model.plant, (recording,), noise)
     rows = np.arange(200, len(recording) - 50, 5)
     bandwidth = np.full(len(noise), 3.0)
-    places = Places(rows, np.zeros_like(rows), rows)
+    places = smoother.places(rows, np.zeros_like(rows), rows)
     found = smoother.along(model, bandwidth)[rows, :, 0]
-    claimed = np.sqrt(np.diagonal(smoother.filtered(model, bandwidth, places).spread(), axis1=1, axis2=2))
+    claimed = np.sqrt(np.diagonal(smoother.filtered(model, bandwidth).spread(places), axis1=1, axis2=2))
     return np.sqrt(np.mean(((found - true[rows]) / claimed) ** 2, axis=0))
 
 

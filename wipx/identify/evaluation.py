@@ -9,7 +9,6 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
-from wipx.identify.kalman import Places
 from wipx.identify.prediction import DIVERGED
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
 from wipx.identify.starts import Starts, starts_of
@@ -162,7 +161,8 @@ class Judge:
         windows = starts.windows
         rows = windows.row + starts.until
         bandwidth = np.full(len(self.noise), RIGHT)
-        covariance = smoother.filtered(model, bandwidth, Places(rows, windows.recording, rows)).spread()
+        places = smoother.places(rows, windows.recording, rows)
+        covariance = smoother.filtered(model, bandwidth).spread(places)
         factors = np.linalg.cholesky(covariance + 1e-18 * np.eye(covariance.shape[1]))
         base = self._replayed(model, starts, 1)
         variance = np.zeros_like(base[:, :, 0]) + (self.noise**2)[:, None]

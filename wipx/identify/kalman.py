@@ -23,12 +23,12 @@ class Places(NamedTuple):
     Attributes:
         rows: Shape (W,).
         recordings: Whose rows, shape (W,).
-        starts: Rows after which the state at each may use `LOOK_AHEAD`, shape (W,).
+        until: Last row that the state at each may be estimated from, shape (W,).
     """
 
     rows: np.ndarray
     recordings: np.ndarray
-    starts: np.ndarray
+    until: np.ndarray
 
 
 class Gains(NamedTuple):
@@ -49,21 +49,17 @@ class Gains(NamedTuple):
 
 @dataclass(frozen=True)
 class Filter:
-    """The filter of a model, and the places where it smooths.
+    """The filter of a model along recordings.
 
     Attributes:
         along: Its gains.
         scale: What the model's sensors show of one unit, shape (joints,).
         late: Delay of each sensor, shape (joints,) [s].
-        places: Where it smooths.
-        until: Last row that the state at each place may be estimated from, shape (W,).
     """
 
     along: Gains
     scale: np.ndarray
     late: np.ndarray
-    places: Places
-    until: np.ndarray
 
     @cached_property
     def corrections(self) -> np.ndarray:
@@ -81,33 +77,33 @@ class Filter:
         """What becomes of an error of the state from one row to the next, shape (K + 1, R, n, n)."""
         return self.along.moves - self.along.gains @ self._seen
 
-    def smoothed(self, prior: np.ndarray, surprises: np.ndarray) -> np.ndarray:
-        """States of P models at the places, shape (W, 2 joints, P).
+    def smoothed(self, places: Places, prior: np.ndarray, surprises: np.ndarray) -> np.ndarray:
+        """States of P models at some places, shape (W, 2 joints, P).
 
         The rows after a place are gone through backwards (Bryson, Frazier 1963).
 
         Args:
+            places: W of them.
             prior: States at every row before they are corrected there, shape (K + 1, R, 2 joints, P).
             surprises: Innovations there, shape (K + 1, R, joints, P).
         """
         told = np.swapaxes(self._seen, 2, 3) @ (self.along.innovation @ surprises)
-        found = np.empty((len(self.until), *prior.shape[2:]))
-        rows, recordings, _ = self.places
-        _smooth(self.along, self._closed, told, rows, recordings, self.until, prior, surprises, found)
+        found = np.empty((len(places.rows), *prior.shape[2:]))
+        _smooth(self.along, self._closed, told, *places, prior, surprises, found)
         return found
 
-    def spread(self) -> np.ndarray:
-        """Covariance of coordinates and rates at the places, shape (W, 2 joints, 2 joints).
+    def spread(self, places: Places) -> np.ndarray:
+        """Covariance of coordinates and rates at some places, shape (W, 2 joints, 2 joints).
 
         Innovations are white, so each later one takes its own share off.
         """
-        rows, recordings, _ = self.places
+        rows, recordings, until = places
         size = 2 * len(self.late)
         found = self.along.covariance[rows, recordings][:, :size]
         error, found = found, found[:, :, :size].copy()
-        for ahead in range(1, 1 + int(np.max(self.until - rows, initial=0))):
-            inside = rows + ahead <= self.until
-            later = np.minimum(rows + ahead, self.until), recordings
+        for ahead in range(1, 1 + int(np.max(until - rows, initial=0))):
+            inside = rows + ahead <= until
+            later = np.minimum(rows + ahead, until), recordings
             seen = error @ np.swapaxes(self._seen[later], 1, 2)
             taken = seen @ self.along.innovation[later] @ np.swapaxes(seen, 1, 2)
             found -= taken * inside[:, None, None]

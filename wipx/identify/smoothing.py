@@ -66,19 +66,32 @@ class Smoother:
         """
         rows, joints, recordings = self._measured.shape
         row, recording = np.nonzero(np.arange(rows)[:, None] <= self._inputs.last)
-        every = Places(row, recording, row)
+        every = self.places(row, recording, row)
         found = np.zeros((rows, recordings, 2 * joints))
-        found[row, recording] = self.following(ModelBatch(model), [self.filtered(model, bandwidth, every)])[0]
+        found[row, recording] = self.following(ModelBatch(model), [self.filtered(model, bandwidth)], every)[0]
         return found.transpose(0, 2, 1)
 
-    def following(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
-        """States of P models, as `along` has them, at the W places of their filters, shape (P, W, 2 joints).
+    def places(self, rows: np.ndarray, recordings: np.ndarray, starts: np.ndarray) -> Places:
+        """Rows (W,) of recordings (W,); the state at each is estimated from those up to `LOOK_AHEAD` after its start.
 
-        They are estimated from the rows up to `LOOK_AHEAD` after the start that a place leads to.
+        Args:
+            rows: Where states are wanted.
+            recordings: Whose rows.
+            starts: Row of the start that each leads to.
+        """
+        until = np.zeros_like(starts)
+        for r, last in enumerate(self._inputs.last):
+            here, t = recordings == r, self._inputs.t[: last + 1, r]
+            until[here] = np.searchsorted(t, t[starts[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
+        return Places(rows, recordings, until)
+
+    def following(self, batch: ModelBatch, filters: Sequence[Filter], places: Places) -> np.ndarray:
+        """States of P models, as `along` has them, at W places, shape (P, W, 2 joints).
 
         Args:
             batch: The models.
             filters: That keep them close to the recordings: one for each, or one for all.
+            places: Where states are wanted.
         """
         late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
@@ -88,10 +101,10 @@ class Smoother:
             joints = surprises.shape[2]
             prior[:, :, :joints] += self._moved_within(late, prior[:, :, joints:])
         if len(filters) == 1:
-            found = filters[0].smoothed(prior, surprises)
+            found = filters[0].smoothed(places, prior, surprises)
         else:
             own = [np.ascontiguousarray(x) for x in (prior, surprises)]
-            parts = [f.smoothed(*(x[..., [p]] for x in own)) for p, f in enumerate(filters)]
+            parts = [f.smoothed(places, *(x[..., [p]] for x in own)) for p, f in enumerate(filters)]
             found = np.concatenate(parts, axis=2)
         return (found * np.tile(scale, (2, 1))).transpose(2, 0, 1)
 
@@ -123,8 +136,7 @@ class Smoother:
             model: The model.
             bandwidth: Of each joint's filter, shape (joints,) [rad/s].
         """
-        nowhere = Places(*np.zeros((3, 0), dtype=np.int64))
-        each = self.filtered(model, bandwidth, nowhere)
+        each = self.filtered(model, bandwidth)
         shown = self._followed(ModelBatch(model), [each], np.zeros(1, dtype=np.int64))
         joints = self._measured.shape[1]
         surprises = self._compared(shown, scales_of(ModelBatch(model)))[1][..., 0]
@@ -149,20 +161,19 @@ class Smoother:
         observer = Observer(self._measured, gains, group, np.zeros((batch.size, len(self.plant.commands))))
         return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
 
-    def filtered(self, model: Model, bandwidth: np.ndarray, places: Places) -> Filter:
-        """The filter of a model, with what it needs to smooth at some places.
+    def filtered(self, model: Model, bandwidth: np.ndarray) -> Filter:
+        """The filter of a model.
 
         Args:
             model: The model.
             bandwidth: Of each joint, shape (joints,) [rad/s].
-            places: Where states are wanted.
         """
         inputs, one = self._inputs, ModelBatch(model)
         scale, late = scales_of(one)[:, 0], delays_of(one)[:, 0]
         sensor = self.noise / np.abs(scale)
         rate = (np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval
         along = gains_along(*self._body(model), inputs.t, inputs.last, sensor, rate, late)
-        return Filter(along, scale, late, places, self._last_seen(places))
+        return Filter(along, scale, late)
 
     def _body(self, model: Model) -> tuple[Linearisation, np.ndarray]:
         """A model's body along the recordings, and by how much single commands move it within each row."""
@@ -175,14 +186,6 @@ class Smoother:
                 self._bodies.clear()
             self._bodies[key] = known
         return known
-
-    def _last_seen(self, places: Places) -> np.ndarray:
-        """Last row that the state at each place may be estimated from, shape (W,)."""
-        found = np.zeros_like(places.starts)
-        for r, last in enumerate(self._inputs.last):
-            here, t = places.recordings == r, self._inputs.t[: last + 1, r]
-            found[here] = np.searchsorted(t, t[places.starts[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
-        return found
 
     @cached_property
     def _inputs(self) -> Inputs:

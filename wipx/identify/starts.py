@@ -39,27 +39,34 @@ class Starts:
 
 def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:
     """Starts by one model, with filters of B bandwidths, each of shape (joints,) [rad/s]."""
-    filters = [smoother.filtered(model, bandwidth, leads_of(windows)) for bandwidth in bandwidths]
+    filters = [smoother.filtered(model, bandwidth) for bandwidth in bandwidths]
     return starts_by(smoother, windows, ModelBatch(model, (), np.zeros((len(filters), 0))), filters)
 
 
 def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
-    """Starts by each of B models, with a filter for each or one for all; these smooth at `leads_of` the windows."""
+    """Starts by each of B models, with a filter for each or one for all."""
     until, first = start_rows(windows), windows.inputs.first
-    found = smoother.following(batch, filters)
+    found = smoother.following(batch, filters, _leads(smoother, windows))
     found = found.reshape(batch.size, windows.count, -1, found.shape[2])
     before = np.clip(until - np.arange(until.max() + 1)[:, None], 0, until - first)
     states = found[:, np.arange(windows.count), before]  # (B, rows, R, 2 joints)
     return Starts(windows, until, np.ascontiguousarray(states.transpose(1, 3, 0, 2)))
 
 
-def leads_of(windows: Windows) -> Places:
+def states_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
+    """True states of B models where windows start, shape (2 joints, B, R); filters as `starts_by` takes them."""
+    rows = windows.row + start_rows(windows)
+    shown = smoother.following(batch, filters, smoother.places(rows, windows.recording, rows))
+    return true_states(batch, shown.transpose(2, 0, 1))
+
+
+def _leads(smoother: Smoother, windows: Windows) -> Places:
     """The rows from the start of each window back to the first that is simulated, window by window."""
     until, first = start_rows(windows), windows.inputs.first
     before = np.minimum(np.arange(np.max(until - first) + 1), (until - first)[:, None])  # (R, rows)
     starts = np.broadcast_to((windows.row + until)[:, None], before.shape)
     recordings = np.broadcast_to(windows.recording[:, None], before.shape)
-    return Places((starts - before).ravel(), recordings.ravel(), starts.ravel())
+    return smoother.places((starts - before).ravel(), recordings.ravel(), starts.ravel())
 
 
 def start_rows(windows: Windows) -> np.ndarray:

@@ -145,6 +145,11 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 
+def must_be_led(batch: ModelBatch) -> bool:
+    """Whether more than coordinates and rates says how models go on: bristles, lags, late sensors and the like."""
+    return bool(coefficients(batch).has[:, list(R.LED)].any())
+
+
 def joint_count(plant: Plant) -> int:
     """Joints of a plant in the kernel."""
     return B.JOINTS if plant.tree is None else len(plant.joints)

@@ -53,7 +53,7 @@ def test_means_of_commands_may_feign_what_swings(
 def test_small_print_is_kept_where_something_is_left_without_it(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     hidden = {"translation/viscous": {"sigma": 3.0}, "environment/spring": {"k": 1.0, "x0": 0.0}}
     robot = bench("linear_axis", hidden, fresh_seed)
-    monkeypatch.setattr(HeldOut, "gain", lambda self, repeated, reduced: 0.0)  # nothing shows
+    monkeypatch.setattr(HeldOut, "gain", lambda self, fitter, repeated, reduced: 0.0)  # nothing shows
     answer = robot.diagnosed()
     assert {effect.name for effect in answer.effects} == set(hidden)
     assert answer.verdict == "mismatch"
@@ -71,7 +71,9 @@ def test_exchanges_do_not_go_round_in_circles(monkeypatch: pytest.MonkeyPatch, f
 
     exchanges = itertools.count()
     monkeypatch.setattr(confirmation, "_uncertain", rich_laws)  # so its simple law has its place
-    monkeypatch.setattr(HeldOut, "gain", lambda self, repeated, reduced: -1.0)  # which held-out recordings contradict
+    monkeypatch.setattr(
+        HeldOut, "gain", lambda self, fitter, repeated, reduced: -1.0
+    )  # which held-out recordings contradict
     monkeypatch.setattr(HeldOut, "error", lambda self, repeated: 0.5 ** next(exchanges))  # any exchange is better
     kept = confirmation.confirmed(context, search, rich)
     assert len(kept.fit.effects) == 1

@@ -5,7 +5,7 @@ does, and are estimated anew when values have moved.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,9 +16,11 @@ from wipx.core.results import HORIZON
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import Smoother
-from wipx.identify.starts import leads_of, start_rows, starts_by
+from wipx.identify.starts import start_rows, starts_by, states_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.coefficients import must_be_led
+from wipx.sim.inputs import Inputs
 
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
 SPACING = 0.005  # [s] of the rows of condensed logs, about
@@ -103,7 +105,7 @@ class Predictions:
 
     def filtered(self, model: Model, bandwidths: np.ndarray) -> Filter:
         """The filter of a model, of bandwidths (joints,) [rad/s], along the recordings."""
-        return self._smoother.filtered(model, bandwidths, leads_of(self.windows))
+        return self._smoother.filtered(model, bandwidths)
 
     @cached_property
     def _smoother(self) -> Smoother:
@@ -125,14 +127,26 @@ class Predictions:
             part = np.arange(begin, min(begin + size, batch.size))
             some = ModelBatch(batch.model, batch.names, None if batch.values is None else batch.values[part])
             own = filters if len(filters) == 1 else filters[part[0] : part[-1] + 1]
-            path = starts_by(self._smoother, windows, some, own).path(some)
-            shown = self.simulator.replay(some, windows.inputs, path.states[0], path).coordinates
+            shown = self._shown(some, own)
             at = np.stack([shown[rows, :, :, np.arange(count)] for rows in sampled])  # (H, N, joints, P)
             errors = at - recorded[..., None]
             errors = np.clip(np.nan_to_num(errors, nan=np.inf), -self._largest[:, None], self._largest[:, None])
             errors = errors / self.noise[:, None] * self.counted[None, :, None, None]
             found[part] = np.transpose(errors, (3, 1, 0, 2)).reshape(len(part), count, -1)
         return found
+
+    def _shown(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
+        """Coordinates that P models show in every row from each start on, shape (K + 1, joints, P, N)."""
+        if must_be_led(batch):
+            path = starts_by(self._smoother, self.windows, batch, filters).path(batch)
+            return self.simulator.replay(batch, self.windows.inputs, path.states[0], path).coordinates
+        states = states_by(self._smoother, self.windows, batch, filters)
+        return self.simulator.replay(batch, self._from_starts, states).coordinates
+
+    @cached_property
+    def _from_starts(self) -> Inputs:
+        """Those of the windows without what leads to their starts."""
+        return replace(self.windows.inputs, first=start_rows(self.windows))
 
     @cached_property
     def _largest(self) -> np.ndarray:
