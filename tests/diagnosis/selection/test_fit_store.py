@@ -1,8 +1,12 @@
 """Fits are looked for again from near, until nothing better is there."""
 
-from diagnosis.recorded import bench
+from dataclasses import replace
+
+import pytest
+from diagnosis.recorded import bench, forecasts
 
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.selection import fit_store
 from wipx.diagnosis.selection.fit_store import FitStore
 
 PLAY = "actuator/backlash"
@@ -19,3 +23,18 @@ def test_a_fit_beside_its_peak_is_left_and_one_on_it_is_kept(fresh_seed: int):
     assert found.log_likelihood > beside.log_likelihood + 1.0
     assert store.escaped(found) is found
     assert store.escaped(nominal).log_likelihood >= nominal.log_likelihood
+
+
+def test_an_effect_of_which_screening_expects_little_is_fitted_if_its_start_explains_most(
+    monkeypatch: pytest.MonkeyPatch, fresh_seed: int
+):
+    case = bench("wip", {"sensor_theta/delay": {"tau": 0.02}}, fresh_seed)
+    fitter = forecasts(case)
+    nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
+    screened = fit_store.candidates_beside(fitter, case.setting, nominal)
+    late = [replace(each, gain=1e-3) for each in screened if each.effect == "sensor_theta/delay"]
+    others = [each for each in screened if each.effect != "sensor_theta/delay"]
+    monkeypatch.setattr(fit_store, "candidates_beside", lambda *given: [*others, *late])
+    fits = FitStore.of(fitter, case.setting, nominal).extensions(nominal)
+    assert len(fits) < len({each.effect for each in screened})
+    assert fits[0].effects == ("sensor_theta/delay",)
