@@ -106,14 +106,8 @@ PATH = (ON_SERVO, ON_OFFSET, ON_DEAD_ZONE, ON_SAG, ON_GAIN, ON_SATURATION, ON_SP
 PATH += (ON_RIPPLE, ON_BACKLASH, ON_ELASTICITY)
 LAWS = (ON_DRAG, ON_STRIBECK, ON_SPOT, ON_LOAD, ON_BRISTLE, ON_PAPER, ON_REMAINDER, ON_SWING)
 MEMORY = (ON_LAG, ON_BACKLASH, ON_ELASTICITY, ON_PAPER, ON_SERVO)
-LED = (
-    *MEMORY,
-    ON_LOAD,
-    ON_BRISTLE,
-    ON_HYSTERESIS,
-    ON_SWING,
-    ON_SENSOR_DELAY,
-)  # go on from more than a state
+# Parts beside which coordinates and rates alone do not say how a joint goes on.
+LED = (*MEMORY, ON_LOAD, ON_BRISTLE, ON_HYSTERESIS, ON_SWING, ON_SENSOR_DELAY)
 
 # What the code of a rigid body is asked for.
 (

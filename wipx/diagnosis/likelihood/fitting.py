@@ -129,13 +129,11 @@ class Fitter(ABC):
     """Fits hypotheses to recordings, by one kind of evidence.
 
     Attributes:
-        considered: Effects that are fitted in each step of a search, at most.
         steps: Levenberg-Marquardt steps from each start of an effect.
         close_call: Evidence within which a rival of an effect is fitted to the end [nats].
         exchanges: Times that the parts of a robot of many joints exchange their effects for better ones, at most.
     """
 
-    considered: ClassVar[int]
     steps: ClassVar[int]
     close_call: ClassVar[float]
     exchanges: ClassVar[int]

@@ -81,7 +81,6 @@ class ForecastFitter(Fitter):
         doubted: The robot, none of whose numbers is quite exact; an effect must hold beside that.
     """
 
-    considered = 6
     steps = 3
     close_call = 20.0
     exchanges = 1

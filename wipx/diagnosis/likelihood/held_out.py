@@ -46,7 +46,8 @@ class HeldOut:
     def gain(self, fitter: Fitter, repeated: Transfer, reduced: Fit) -> float:
         """Share of the squared prediction error that an effect removes from recordings it was not fitted to.
 
-        The fit without it knows these recordings, and loses against it all the same, or is repeated without them too.
+        The fit without it knows these recordings. If it predicts them better, which may be for that reason, it is
+        repeated without them too.
 
         Args:
             fitter: Of both.

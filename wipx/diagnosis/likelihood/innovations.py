@@ -41,7 +41,6 @@ class InnovationFitter(Fitter):
         joints: Whose noise is searched for; empty for that of all joints.
     """
 
-    considered = 6
     steps = 5
     close_call = 60.0
     exchanges = 2

@@ -25,7 +25,8 @@ LOOKED_AT = 8  # starts of each effect that are simulated
 STARTS = 2  # and those from which it is fitted
 WORTH_TRIALS = 0.25  # of the best score, from which a rough effect is searched by trial; all that won so had half
 FITTED_TO_THE_END = 3  # effects for which they are, at most
-CONSIDERED_IN_PART = 4  # effects of one of many parts that are fitted in each step, at most
+CONSIDERED = 6  # effects that are fitted in each step, at most
+CONSIDERED_IN_PART = 4  # and of one of many parts
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ class FitStore:
         least = max(rules.promising * best, rules.worthless)
         if self.is_of_part:
             least = max(least, self.least_expected(fit), self.fitter.rules.selection.expected_share * best)
-        most = min(self.fitter.considered, CONSIDERED_IN_PART) if self.is_of_part else self.fitter.considered
+        most = CONSIDERED_IN_PART if self.is_of_part else CONSIDERED
         hidden = [name for name in by_effect if nonsmooth_search.hides(fit, name)]
         names = [name for name in by_effect if by_effect[name][0].gain >= least or name in hidden]
         begun = self.side_by_side(lambda name: self._starts(fit, by_effect[name][:LOOKED_AT]), names)
