@@ -221,7 +221,9 @@ class FitStore:
         names = [name for name in by_effect if by_effect[name][0].gain >= least or name in hidden]
         begun = self.side_by_side(lambda name: self._starts(fit, by_effect[name][:LOOKED_AT]), names)
         begun.sort(key=lambda start: -start.log_likelihood)
-        fits = self._raced(fit, begun[:most] + [start for start in begun[most:] if start.effect in hidden])
+        # The start of a rough effect does not tell how far a search by trial leads.
+        rough = [start for start in begun[most:] if start.effect in hidden or kind_of(start.effect).non_smooth]
+        fits = self._raced(fit, begun[:most] + rough)
         fits.sort(key=lambda f: -score(f, fit))
         least = race.CLOSE * max((evidence(fit, f) for f in fits), default=0.0)
         close = [f for f in fits[:FITTED_TO_THE_END] if evidence(fit, f) >= least]
