@@ -30,7 +30,7 @@ CONSIDERED_IN_PART = 4  # and of one of many parts
 
 
 @dataclass(frozen=True)
-class Starts:
+class EffectStarts:
     """Where fits with one effect more begin.
 
     Attributes:
@@ -234,7 +234,7 @@ class FitStore:
             self._fits.setdefault(frozenset(end.effects), end)
         return sorted([*ends, *rest], key=lambda f: -score(f, fit))
 
-    def _raced(self, fit: Fit, starts: Sequence[Starts]) -> list[Fit]:
+    def _raced(self, fit: Fit, starts: Sequence[EffectStarts]) -> list[Fit]:
         """The best fit with each of some effects more, as far as it is worth following."""
         fits = race.run(self._stepped, fit, self.side_by_side(self._begun, starts), self.fitter.steps)
         least = race.least_score([each for own in fits for each in own], fit, WORTH_TRIALS)
@@ -250,7 +250,7 @@ class FitStore:
         """Fits on their way, one step further each."""
         return self.side_by_side(self.fitter.stepped, climbs)
 
-    def _starts(self, fit: Fit, candidates: list[Candidate]) -> Starts:
+    def _starts(self, fit: Fit, candidates: list[Candidate]) -> EffectStarts:
         """Where fits with one effect more begin: at the likeliest of its candidates.
 
         One of them, at least, begins where the other numbers have made room for the effect.
@@ -270,9 +270,9 @@ class FitStore:
         likelihoods = self.fitter.likelihoods_of(every, levels)
         ranked = [every[i] for i in np.argsort(-likelihoods)]
         chosen = ranked[:1] if count == 1 else _first_of(ranked, roomy, 1) + _first_of(ranked, alone, count - 1)
-        return Starts(name, chosen, levels, float(likelihoods.max()))
+        return EffectStarts(name, chosen, levels, float(likelihoods.max()))
 
-    def _begun(self, starts: Starts) -> list[Climb]:
+    def _begun(self, starts: EffectStarts) -> list[Climb]:
         return [self.fitter.begun(begin, starts.levels) for begin in starts.hypotheses]
 
     def _with(self, fit: Fit, effect: str, values: Sequence[Mapping[str, float]]) -> list[Hypothesis]:
