@@ -23,7 +23,6 @@ UNITS = {
     "periods": ("1", "1"),  # per turn of the motor; the unit is one period over its whole way
     "per_coordinate": ("1/m", "1/rad"),
     "per_time": ("1/s", "1/s"),
-    "per_load": ("1/N", "1/(N m)"),
 }
 
 
@@ -74,7 +73,6 @@ class Scales:
             "periods": 2.0 * pi / self.turn,
             "per_coordinate": 1.0,
             "per_time": 1.0,
-            "per_load": 1.0 / self.usual,
         }[dimension]
 
 

@@ -12,6 +12,7 @@ from wipx.effects.trees import elasticity
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
+TINY = 1e-200  # [N or N m] added to forces by which something is divided
 EARLY = 1e-9  # [s] before its time that the loop of a drive looks; steps end there but for rounding
 
 
@@ -84,8 +85,10 @@ def actuator_path(S, J, n, on, has, j):
             J[R.DRIVE * W + w] = dead_zone.force(J[R.DRIVE * W + w], J[R.DEAD_BAND * W + w], J[R.SPREAD * W + w])
     if has[j, R.ON_SAG]:
         for w in range(n):
-            lost = J[R.SAG_TIME * W + w] * S[R.TIME * W + w] + J[R.SAG_LOAD * W + w] * abs(J[R.DRIVE * W + w])
-            J[R.DRIVE * W + w] *= 1.0 - lost + J[R.SAG_NONE * W + w]
+            asked, usual, middle = abs(J[R.DRIVE * W + w]), J[R.SAG_USUAL * W + w], J[R.SAG_MIDDLE * W + w]
+            lost = J[R.SAG_TIME * W + w] * (min(S[R.TIME * W + w], 2.0 * middle) - middle)
+            lost += J[R.SAG_LOAD * W + w] * (asked - usual) / (asked + usual + TINY)
+            J[R.DRIVE * W + w] *= 1.0 - lost
     if has[j, R.ON_GAIN]:
         for w in range(n):
             J[R.DRIVE * W + w] *= J[R.GAIN * W + w]

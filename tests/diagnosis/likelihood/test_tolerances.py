@@ -49,6 +49,6 @@ def test_numbers_within_tolerance_have_priors_and_others_are_given(fresh_seed: i
     moved = fitter.in_doubt(nominal).hypothesis
     free = {number.name: number for number in moved.space.free}
     assert free[f"{ENCODER}.s"].prior_std == pytest.approx(0.01)
-    assert free[f"{DRIVE}.l"].prior_std == pytest.approx(0.1 / case.setting.scales["actuator"].usual)
+    assert free[f"{DRIVE}.l"].prior_std == pytest.approx(0.2)
     assert not {f"{ENCODER}.n", f"{DRIVE}.t_0", f"{DRIVE}.u_0"} & set(free)
     assert np.all(np.abs(moved.space.prior_residuals(moved.cube)) < 4.0)
