@@ -121,6 +121,17 @@ class FitStore:
         simple = reduced_law(effect, rest, fit.hypothesis.model.plant)
         return None if simple is None else self.fitted((*rest, simple), fit)
 
+    def with_other_law(self, fit: Fit, effect: str, other: str) -> Fit:
+        """The fit with another effect in the place of one, from the noise of the first on.
+
+        Without either the noise is too loud for what tells them apart.
+        """
+        effects = tuple(other if each == effect else each for each in fit.effects)
+        if frozenset(effects) not in self._fits:
+            hypothesis = Hypothesis.of(self.setting, effects, fit.hypothesis.values)
+            self.keep(self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2))
+        return self._fits[frozenset(effects)]
+
     def candidates_for(self, fit: Fit) -> list[Candidate]:
         """Where to start for every effect that could be added, the best first."""
         if id(fit) not in self._candidates:

@@ -23,7 +23,7 @@ from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.selection.criteria import Criteria, evidence
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import DOUBTED, Chosen, ConsideredEffect, History, Search, named_effects
-from wipx.effects.catalogue import effect_of
+from wipx.effects.catalogue import effect_of, vocabulary
 
 TRIED = 3  # weakest effects of the whole robot, without which it is fitted
 
@@ -108,6 +108,25 @@ class PartSearch(Search):
         """Whether it gains a good part of what it must: less, in one of many parts, is mostly chance."""
         return evidence(current, one) >= self.rules.expected_share * self.criteria.required_gain(current, one)
 
+    def with_better_links(self, fit: Fit) -> Fit:
+        """A fit in which no other law of the mass of a link suits that link better.
+
+        A payload, a shifted centre of mass and a wrong inertia imitate each other while much else is missing.
+        """
+        plant = self.store.setting.nominal.plant
+        of_links = [name for name in fit.effects if plant.class_of(_site(name)) == "link"]
+        others = [
+            (name, other)
+            for name in of_links
+            for other in vocabulary(plant)
+            if _site(other) == _site(name) and other not in fit.effects
+        ]
+        found = self.store.side_by_side(lambda pair: self.store.with_other_law(fit, *pair), others)
+        best = max(found, key=lambda each: self.criteria.score_lead(each, fit), default=fit)
+        if best is fit or self.criteria.lead(best, fit) <= self.rules.least_lead:
+            return fit
+        return self.with_better_links(best)
+
 
 @dataclass(frozen=True)
 class RobotSearch(Search):
@@ -183,7 +202,8 @@ class RobotSearch(Search):
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
         """A part with a further effect, where any may gain enough; laws that need no longer be rich are simple."""
         if own.effects:
-            own = self._search_in(store, own).preferred([own], store.nominal) or own
+            search = self._search_in(store, own)
+            own = search.with_better_links(search.preferred([own], store.nominal) or own)
         if not store.is_promising(own):
             return Chosen(own)
         return self._search_in(store, own).grown(own, steps=1)
@@ -227,15 +247,23 @@ class RobotSearch(Search):
         return self.run(fit)
 
     def pruned(self, fit: Fit) -> Chosen:
-        """Without the effects that those of other parts make superfluous, looked for among the weakest ones."""
+        """Without the effects that those of other parts make superfluous, looked for among the weakest ones.
+
+        What is explained elsewhere does not raise what an effect must gain.
+        """
         losses = {effect: expected_loss(fit, effect) for effect in named_effects(fit)} if len(fit.effects) > 1 else {}
         doubted = [each for each in losses if losses[each] < DOUBTED * self.criteria.most_required(fit, each)]
         for effect in sorted(doubted, key=lambda effect: losses[effect])[:TRIED]:
             smaller = self.store.without(fit, effect)
-            if not self.criteria.gains_enough(smaller, fit):
+            if not self._criteria_beside(fit, effect).gains_enough(smaller, fit):
                 considered = ConsideredEffect(effect, evidence(smaller, fit), False, "superfluous beside other joints'")
                 return self.pruned(smaller).after((considered,))
         return Chosen(fit)
+
+    def _criteria_beside(self, fit: Fit, effect: str) -> Criteria:
+        """Criteria that count what the part of an effect explains beside all that a fit has elsewhere."""
+        sites = next(part for part in parts_of(self.plant) if _site(effect) in part)
+        return Criteria(self.store.fitter, self._part(fit, sites)[0].nominal)
 
     def split(self, fit: Fit, *, with_stand_ins: bool = False) -> tuple[tuple[Search, Fit], ...]:
         """The searches of the parts that have effects, and the fit as each of them sees it."""
@@ -299,7 +327,7 @@ class RobotSearch(Search):
         again = fitter.converged(fitter.fit(others, self.nominal.levels))
         return max(found, again, key=lambda fit: fit.log_likelihood)
 
-    def _search_in(self, store: FitStore, begun: Fit) -> Search:
+    def _search_in(self, store: FitStore, begun: Fit) -> PartSearch:
         """The search of a part that begins at a fit."""
         if not begun.effects:
             return PartSearch.of(store, store.nominal, self.held_out)

@@ -60,7 +60,7 @@ class Search:
     exchanges: ClassVar[int] = 3  # rounds at most
 
     @classmethod
-    def of(cls, store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> "Search":
+    def of(cls, store: FitStore, nominal: Fit, held_out: HeldOut | None = None) -> Self:
         """A search that begins at the nominal model, whose noise is fitted to the end first."""
         begun = cls(store, Criteria(store.fitter, nominal), None)
         first = begun.preferred(store.extensions(nominal), nominal)
