@@ -62,6 +62,9 @@ def test_a_law_of_nearly_every_machine_is_preferred_and_needs_less_evidence(fres
     assert usual == fitter.odds_of(())
     assert usual - rare == pytest.approx(np.log(fitter.looked_at))
     assert fitter.odds_of(("translation/viscous", "actuator/dead_zone", "actuator/ripple")) == pytest.approx(2.0 * rare)
+    forms = ("translation/stribeck", "translation/presliding")  # of dry friction
+    assert [fitter.odds_of((form,)) for form in forms] == pytest.approx([-np.log(2.0)] * 2)
+    assert fitter.odds_of(("translation/sticky_spot",)) == rare
 
 
 def test_a_late_sensor_is_timed_though_every_start_is_estimated_through_it(fresh_seed: int):

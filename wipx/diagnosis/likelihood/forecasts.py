@@ -188,7 +188,8 @@ class ForecastFitter(Fitter):
         Vuong's test on the differences of their likelihoods (1989, Econometrica 57(2)), at a level for all effects that
         are looked at together; likely ones were not picked from so many.
         """
-        picked_from = 1 if all(map(self._is_likely, set(larger.effects) - set(smaller.effects))) else self.looked_at
+        added = set(larger.effects) - set(smaller.effects)
+        picked_from = max(map(self._picked_from, added), default=1)
         return self._agree_on(self._held_out(larger) - self._held_out(smaller), picked_from)
 
     def completes(self, smaller: Fit, larger: Fit) -> bool:
@@ -216,17 +217,32 @@ class ForecastFitter(Fitter):
         return np.ravel(fitted_whitening(own.T[:, :, None])[0]) ** -2.0
 
     def odds_of(self, effects: tuple[str, ...]) -> float:
-        """Those of picking an effect from all that are looked for, unless it is likely."""
-        return -float(np.log(self.looked_at)) * sum(not self._is_likely(effect) for effect in effects)
+        """Those of picking each effect from all that are as likely beforehand."""
+        return -sum(float(np.log(self._picked_from(effect))) for effect in effects)
 
-    def _is_likely(self, effect: str) -> bool:
-        """Whether nearly every machine has an effect, or recorded forces ask for it."""
-        return kind_of(effect).usual or self.doubted.expects(effect)
+    def _picked_from(self, effect: str) -> int:
+        """How many effects are as likely beforehand; one where nearly every machine has it, or recorded forces ask.
 
-    @cached_property
+        What nearly every machine has may follow a richer law, one of a few.
+        """
+        if kind_of(effect).usual or self.doubted.expects(effect):
+            return 1
+        if _takes_the_place_of_a_usual_one(effect):
+            site = effect.partition("/")[0]
+            return sum(
+                name.partition("/")[0] == site and _takes_the_place_of_a_usual_one(name) for name in self.searched
+            )
+        return self.looked_at
+
+    @property
     def looked_at(self) -> int:
         """How many effects are looked for."""
-        return sum(self.looks_for(name, effect) for name, effect in vocabulary(self.data.plant).items())
+        return len(self.searched)
+
+    @cached_property
+    def searched(self) -> tuple[str, ...]:
+        """Effects that are looked for."""
+        return tuple(name for name, effect in vocabulary(self.data.plant).items() if self.looks_for(name, effect))
 
     def _held_out(self, fit: Fit) -> np.ndarray:
         """Log-likelihood of each prediction by the numbers that suit other stretches, shape (N,).
@@ -385,3 +401,10 @@ class ForecastFitter(Fitter):
 def _key(fit: Fit) -> tuple[tuple[str, ...], bytes]:
     """What tells fits of the same recordings apart."""
     return fit.hypothesis.space.names, fit.hypothesis.cube.tobytes()
+
+
+def _takes_the_place_of_a_usual_one(effect: str) -> bool:
+    """Whether an effect "site/kind" takes the place of a simpler one that nearly every machine has."""
+    kind, site = kind_of(effect), effect.partition("/")[0]
+    simple = kind.contains.kind if kind.contains is not None else ""
+    return simple in kind.excludes and kind_of(f"{site}/{simple}").usual
