@@ -10,9 +10,10 @@ from diagnosis.recorded_arm import arm, recorded
 from sim.random_trees import mjcf
 
 from wipx.core.plant import robot_plant
+from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.fit_store import FitStore
-from wipx.diagnosis.selection.robot_search import RobotSearch, expected_loss, parts_of
+from wipx.diagnosis.selection.robot_search import PartSearch, RobotSearch, expected_loss, parts_of
 from wipx.recordings.robot_model import read_tree
 
 
@@ -64,3 +65,28 @@ def test_a_load_and_a_rotor_are_told_apart_beside_friction(
     nominal = case.fit()
     search = RobotSearch.of(FitStore.of(case.fitter, case.setting, nominal), nominal)
     assert set(search.run(nominal).fit.effects) == hidden.keys()
+
+
+SHIFT = {"link_lower/com_offset": {"x": 0.02, "y": 0.01, "z": 0.03}}
+
+
+def test_a_link_gets_the_law_of_its_mass_that_suits_it_while_friction_is_still_missing(tmp_path: Path, fresh_seed: int):
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects(SHIFT | FRICTION), fresh_seed),), {})
+    nominal = case.fit()
+    search = PartSearch.of(FitStore.of(case.fitter, case.setting, nominal), nominal)
+    loaded = search.store.keep(case.fit("link_lower/payload"))
+    assert search.with_better_links(loaded).effects == tuple(SHIFT)
+
+
+def test_what_one_joint_explains_does_not_raise_what_another_must_gain(tmp_path: Path, fresh_seed: int):
+    hidden = {"shoulder/coulomb": {"F_c": 0.3}, "elbow/coulomb": {"F_c": 2e-5}}
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects(hidden), fresh_seed),), {})
+    rules = replace(USUAL, selection=replace(USUAL.selection, least_share=0.5, most_asked=1e9))
+    fitter, nominal = replace(case.fitter, rules=rules), case.fit()
+    search = RobotSearch.of(FitStore.of(fitter, case.setting, nominal), nominal)
+    both = search.store.keep(case.fit(*hidden))
+    smaller = search.store.without(both, "elbow/coulomb")
+    assert evidence(smaller, both) < search.criteria.required_gain(smaller, both)
+    assert search.pruned(both).fit is both
