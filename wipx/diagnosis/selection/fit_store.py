@@ -127,10 +127,10 @@ class FitStore:
         Without either the noise is too loud for what tells them apart.
         """
         effects = tuple(other if each == effect else each for each in fit.effects)
-        if frozenset(effects) not in self._fits:
-            hypothesis = Hypothesis.of(self.setting, effects, fit.hypothesis.values)
-            self.keep(self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2))
-        return self._fits[frozenset(effects)]
+        hypothesis = Hypothesis.of(self.setting, effects, fit.hypothesis.values)
+        found = self.fitter.converged(self.fitter.fit(hypothesis, fit.levels), rounds=2)
+        known = self._fits.get(frozenset(effects), found)
+        return self.keep(max(found, known, key=lambda each: each.log_likelihood))
 
     def candidates_for(self, fit: Fit) -> list[Candidate]:
         """Where to start for every effect that could be added, the best first."""
