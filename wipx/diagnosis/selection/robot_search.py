@@ -200,7 +200,10 @@ class RobotSearch(Search):
         return dict(zip(parts, found, strict=True))
 
     def _grown_in(self, store: FitStore, own: Fit) -> Chosen:
-        """A part with a further effect, where any may gain enough; laws that need no longer be rich are simple."""
+        """A part with a further effect, where any may gain enough.
+
+        Before, laws that need no longer be rich become simple, and those of links the ones that suit them best.
+        """
         if own.effects:
             search = self._search_in(store, own)
             own = search.with_better_links(search.preferred([own], store.nominal) or own)
