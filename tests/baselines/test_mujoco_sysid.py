@@ -102,7 +102,7 @@ def test_a_positive_pitch_falls_as_in_the_analytic_simulator(mujoco: Any):
     [
         pytest.param("linear_axis", "translation/viscous.sigma", 1.5, marks=pytest.mark.slow),
         pytest.param("linear_axis", "translation/coulomb.F_c", 0.8, marks=pytest.mark.slow),
-        ("pendulum", "pitch/coulomb.F_c", 0.15),
+        pytest.param("pendulum", "pitch/coulomb.F_c", 0.15, marks=pytest.mark.slow),
     ],
 )
 def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: str, value: float, fresh_seed: int):
