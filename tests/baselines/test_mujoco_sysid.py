@@ -97,12 +97,13 @@ def test_a_positive_pitch_falls_as_in_the_analytic_simulator(mujoco: Any):
     np.testing.assert_allclose(data.qpos, shown, rtol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name", "value"),
     [
-        pytest.param("linear_axis", "translation/viscous.sigma", 1.5, marks=pytest.mark.slow),
-        pytest.param("linear_axis", "translation/coulomb.F_c", 0.8, marks=pytest.mark.slow),
-        pytest.param("pendulum", "pitch/coulomb.F_c", 0.15, marks=pytest.mark.slow),
+        ("linear_axis", "translation/viscous.sigma", 1.5),
+        ("linear_axis", "translation/coulomb.F_c", 0.8),
+        ("pendulum", "pitch/coulomb.F_c", 0.15),
     ],
 )
 def test_the_toolbox_finds_friction_and_its_size(mujoco: Any, kind: str, name: str, value: float, fresh_seed: int):
