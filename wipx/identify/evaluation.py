@@ -50,8 +50,9 @@ class Judge:
         return _by_recording(starts.windows, self._predicted(model, starts), recordings)
 
     def from_same_states(self, model: Model, recordings: tuple[Recording, ...]) -> "FromSameStates":
-        """Predictions by other simulators, each from the states that this model smooths."""
-        return FromSameStates(self, model, self._starts(model, recordings), recordings)
+        """Predictions by other simulators, each from the coordinates and rates that this model smooths."""
+        starts = replace(self._starts(model, recordings), carried=None)
+        return FromSameStates(self, model, starts, recordings)
 
     def compare(
         self, nominal: Model, completed: Model, recordings: tuple[Recording, ...], *, held_out: bool

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,18 @@ BANDWIDTHS = (1.0, 3.0, 10.0, 30.0, 100.0)  # [rad/s] from nearly no disturbance
 MOST_KNOWN = 8  # bodies that are kept; each holds as much as a recording for every joint
 RUN_AWAY = 1e12  # [m, rad, m/s, rad/s] where a model that diverges is stopped, so that its squares stay finite
 FEWEST_ROWS = 4  # from which the first rates are read, at least
+
+
+class Followed(NamedTuple):
+    """What P models that a filter keeps close to recordings tell.
+
+    Attributes:
+        states: At W places, shape (P, W, 2 joints), see `Smoother.along`.
+        carried: What joints carry from step to step at K rows, as filtered, shape (N, STATES, P, K); None if not asked.
+    """
+
+    states: np.ndarray
+    carried: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -68,7 +81,7 @@ class Smoother:
         row, recording = np.nonzero(np.arange(rows)[:, None] <= self._inputs.last)
         every = self.places(row, recording, row)
         found = np.zeros((rows, recordings, 2 * joints))
-        found[row, recording] = self.following(ModelBatch(model), [self.filtered(model, bandwidth)], every)[0]
+        found[row, recording] = self.following(ModelBatch(model), [self.filtered(model, bandwidth)], every).states[0]
         return found.transpose(0, 2, 1)
 
     def places(self, rows: np.ndarray, recordings: np.ndarray, starts: np.ndarray) -> Places:
@@ -85,17 +98,24 @@ class Smoother:
             until[here] = np.searchsorted(t, t[starts[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
         return Places(rows, recordings, until)
 
-    def following(self, batch: ModelBatch, filters: Sequence[Filter], places: Places) -> np.ndarray:
-        """States of P models, as `along` has them, at W places, shape (P, W, 2 joints).
+    def following(
+        self,
+        batch: ModelBatch,
+        filters: Sequence[Filter],
+        places: Places,
+        kept: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> Followed:
+        """States of P models, as `along` has them, at W places.
 
         Args:
             batch: The models.
             filters: That keep them close to the recordings: one for each, or one for all.
             places: Where states are wanted.
+            kept: Rows (K,) of recordings (K,) at which to tell what joints carry from step to step; None for none.
         """
         late, scale = delays_of(batch), scales_of(batch)  # (joints, P)
         group = np.arange(batch.size) if len(filters) > 1 else np.zeros(batch.size, dtype=np.int64)
-        shown = self._followed(batch, filters, group)
+        shown = self._followed(batch, filters, group, kept)
         prior, surprises = self._compared(shown, scale)
         if np.any(late):
             joints = surprises.shape[2]
@@ -106,7 +126,7 @@ class Smoother:
             own = [np.ascontiguousarray(x) for x in (prior, surprises)]
             parts = [f.smoothed(places, *(x[..., [p]] for x in own)) for p, f in enumerate(filters)]
             found = np.concatenate(parts, axis=2)
-        return (found * np.tile(scale, (2, 1))).transpose(2, 0, 1)
+        return Followed((found * np.tile(scale, (2, 1))).transpose(2, 0, 1), shown.carried)
 
     def _moved_within(self, late: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """How far each joint has moved up to every row since a time before it, shape (K + 1, R, joints, P).
@@ -155,10 +175,17 @@ class Smoother:
         _compare(shown.coordinates, shown.rates, self._measured, scale, prior, surprises)
         return prior, surprises
 
-    def _followed(self, batch: ModelBatch, filters: Sequence[Filter], group: np.ndarray) -> Rollouts:
+    def _followed(
+        self,
+        batch: ModelBatch,
+        filters: Sequence[Filter],
+        group: np.ndarray,
+        kept: tuple[np.ndarray, np.ndarray] | None = None,
+    ) -> Rollouts:
         """What P models, each kept close by one of the filters, show at every row before they are corrected there."""
         gains = filters[0].corrections[None] if len(filters) == 1 else np.stack([f.corrections for f in filters])
-        observer = Observer(self._measured, gains, group, np.zeros((batch.size, len(self.plant.commands))))
+        spread = np.zeros((batch.size, len(self.plant.commands)))
+        observer = Observer(self._measured, gains, group, spread, kept=kept)
         return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
 
     def filtered(self, model: Model, bandwidth: np.ndarray) -> Filter:

@@ -22,19 +22,27 @@ class Starts:
         until: Row of each window at which its prediction starts, shape (R,).
         states: As the sensors of each of B models show them, without their delay, shape (rows, 2 joints, B, R). Rows
             before the first that is simulated have the state of that.
+        carried: What joints carry from earlier steps to that row (`wipx.sim.rows`), shape (N, STATES, B, R);
+            None where they begin there.
     """
 
     windows: Windows
     until: np.ndarray
     states: np.ndarray
+    carried: np.ndarray | None
 
     def of(self, index: np.ndarray) -> "Starts":
         """Of another one of the B models for each window, index (R,)."""
-        return replace(self, states=self.states[:, :, index, np.arange(len(index))][:, :, None])
+        windows = np.arange(len(index))
+        return replace(
+            self,
+            states=self.states[:, :, index, windows][:, :, None],
+            carried=None if self.carried is None else self.carried[:, :, index, windows][:, :, None],
+        )
 
     def path(self, batch: ModelBatch) -> Path:
         """The true states of each of the B models that its sensors would show so."""
-        return Path(true_states(batch, self.states), self.until)
+        return Path(true_states(batch, self.states), self.until, self.carried)
 
 
 def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:
@@ -46,18 +54,25 @@ def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Se
 def starts_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> Starts:
     """Starts by each of B models, with a filter for each or one for all."""
     until, first = start_rows(windows), windows.inputs.first
-    found = smoother.following(batch, filters, _leads(smoother, windows))
-    found = found.reshape(batch.size, windows.count, -1, found.shape[2])
+    followed = smoother.following(batch, filters, _leads(smoother, windows), (windows.row + first, windows.recording))
+    found = followed.states.reshape(batch.size, windows.count, -1, followed.states.shape[2])
     before = np.clip(until - np.arange(until.max() + 1)[:, None], 0, until - first)
     states = found[:, np.arange(windows.count), before]  # (B, rows, R, 2 joints)
-    return Starts(windows, until, np.ascontiguousarray(states.transpose(1, 3, 0, 2)))
+    return Starts(windows, until, np.ascontiguousarray(states.transpose(1, 3, 0, 2)), followed.carried)
 
 
-def states_by(smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
-    """True states of B models where windows start, shape (2 joints, B, R); filters as `starts_by` takes them."""
+def starts_at_once(
+    smoother: Smoother, windows: Windows, batch: ModelBatch, filters: Sequence[Filter]
+) -> tuple[np.ndarray, Path]:
+    """True states of B models where windows start, shape (2 joints, B, R), and what joints carry to there.
+
+    Sensors must not be late; filters as `starts_by` takes them.
+    """
     rows = windows.row + start_rows(windows)
-    shown = smoother.following(batch, filters, smoother.places(rows, windows.recording, rows))
-    return true_states(batch, shown.transpose(2, 0, 1))
+    kept = (rows, windows.recording)
+    followed = smoother.following(batch, filters, smoother.places(*kept, rows), kept)
+    assert followed.carried is not None  # as asked for
+    return true_states(batch, followed.states.transpose(2, 0, 1)), Path.behind(followed.carried)
 
 
 def _leads(smoother: Smoother, windows: Windows) -> Places:

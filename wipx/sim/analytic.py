@@ -41,6 +41,7 @@ class Observer:
         spread: Half width by which single commands scatter about the mean that the log has, shape (P, inputs)
             [N or N m]; thresholds of the actuator answer to single commands.
         reports: Whether to tell the forces of the drives.
+        kept: Rows (W,) of recordings (W,) at which to tell what joints carry from step to step; None for none.
     """
 
     recorded: np.ndarray
@@ -48,6 +49,7 @@ class Observer:
     group: np.ndarray
     spread: np.ndarray
     reports: bool = False
+    kept: tuple[np.ndarray, np.ndarray] | None = None
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class AnalyticSimulator:
             path: Where the rollouts are led at first; None where they are left to themselves from the start.
         """
         run = _Run(self, batch, inputs)
-        run.advance(run.layout.states(initial), run.begin(initial), run.layout.rows, path=path)
+        run.advance(run.layout.states(initial, path), run.begin(initial), run.layout.rows, path=path)
         return run.rollouts(inputs.commands[:, :, None, :])
 
     def follow(self, batch: ModelBatch, inputs: Inputs, initial: np.ndarray, observer: Observer) -> Rollouts:
@@ -108,6 +110,8 @@ class AnalyticSimulator:
         run = _Run(self, batch, inputs)
         if observer.reports:
             run.report()
+        if observer.kept is not None:
+            run.keep(*observer.kept)
         run.advance(run.layout.states(initial), 0, run.layout.rows, observer=observer)
         return run.rollouts(inputs.commands[:, :, None, :])
 
@@ -175,6 +179,8 @@ class _Run:
         self.out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))
         self.past = self.layout.past(self.coefficients.has)
         self.delivered = self.layout.held()
+        self.places = np.full((0, 1), -1)
+        self.carried = np.zeros((1, R.STATES, 1, 0))
 
     def begin(self, initial: np.ndarray) -> int:
         """Row from which a replay must be simulated: that of the first step, where no sensor looks further back."""
@@ -188,6 +194,12 @@ class _Run:
         """Keep the forces of the drives too."""
         self.coefficients.on[R.ON_REPORT] = True
         self.delivered = np.zeros((self.layout.rows, self.layout.width, self.layout.lanes))
+
+    def keep(self, rows: np.ndarray, windows: np.ndarray) -> None:
+        """Keep what joints carry at some rows (W,) of windows (W,), no row twice."""
+        self.places = np.full(self.inputs.t.shape, -1)
+        self.places[rows, windows] = np.arange(len(rows))
+        self.carried = np.zeros((self.layout.width, R.STATES, self.layout.models, len(rows)))
 
     def advance(
         self, states, first_row, last_row, commands=None, loop: ClosedLoop | None = None, observer=None, path=None
@@ -231,6 +243,8 @@ class _Run:
                 measured,
                 corrections,
                 group,
+                self.places,
+                self.carried,
                 led,
                 until,
                 self.past,
@@ -276,4 +290,5 @@ class _Run:
 
     def rollouts(self, commands: np.ndarray) -> Rollouts:
         reported = self.coefficients.on[R.ON_REPORT]
-        return self.layout.rollouts(self.out, commands, self.layout.per_command(self.delivered) if reported else None)
+        delivered = self.layout.per_command(self.delivered) if reported else None
+        return self.layout.rollouts(self.out, commands, delivered, self.carried if len(self.places) else None)

@@ -145,9 +145,9 @@ def coefficients(batch: ModelBatch, smoothing: tuple[float, ...] = ()) -> Coeffi
     return Coefficients(f.body, f.joints, f.on, f.has, rigid)
 
 
-def must_be_led(batch: ModelBatch) -> bool:
-    """Whether more than coordinates and rates says how models go on: bristles, lags, late sensors and the like."""
-    return bool(coefficients(batch).has[:, list(R.LED)].any())
+def sensors_are_late(batch: ModelBatch) -> bool:
+    """Whether sensors of models show where joints were some time before."""
+    return bool(coefficients(batch).has[:, R.ON_SENSOR_DELAY].any())
 
 
 def joint_count(plant: Plant) -> int:

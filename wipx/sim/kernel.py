@@ -21,7 +21,7 @@ from wipx.sim.body import double_body, wip_body
 from wipx.sim.cache import cached
 from wipx.sim.joints import arrived, drifted, levels, smooth_friction
 from wipx.sim.rows import TOGETHER, W
-from wipx.sim.sensors import correct, feedback, guide, pushed, record
+from wipx.sim.sensors import correct, feedback, guide, keep, pushed, record
 from wipx.sim.sticking import rates_at_the_end
 
 
@@ -200,6 +200,8 @@ def rollout(
     measured,
     observer,
     group,
+    places,
+    carried,
     path,
     until,
     past,
@@ -235,6 +237,8 @@ def rollout(
         measured: What it sees, shape (K + 1, N or 2 N, R).
         observer: Its gains, shape (groups, K + 1, R, 2 N or 3 N, N or 2 N).
         group: Which of them each model has, shape (P,).
+        places: Place at which a row's corrected states are kept, shape (K + 1, R), -1 for none; (0, 1) for no row.
+        carried: Room for them, shape (N, STATES, P, places).
         path: True coordinates and rates to which the state is put, shape (rows, 2 N, lanes), or R for all models.
         until: Last row at which it is, shape (R,); -1 for never.
         past: True coordinates and rates for sensor delays, shape (K + 1, 2 N, lanes); else (1, 2 N, 1).
@@ -276,6 +280,8 @@ def rollout(
                 for w in range(count):
                     counts[w] = substeps[k, lanes[0, w]]
                 correct(B, has, past, t_rows, lanes, k, lane0, count, measured, observer, group, counts)
+                if k < len(places):
+                    keep(B, lanes, k, lane0, count, places, carried)
             if closed:
                 feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, noise, settings)
             else:

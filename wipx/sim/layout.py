@@ -81,9 +81,11 @@ class Layout:
         """The joint on which each command acts."""
         return [joint_index(self.plant, site) for site in self.plant.actuated]
 
-    def states(self, initial: np.ndarray) -> np.ndarray:
+    def states(self, initial: np.ndarray, path: Path | None = None) -> np.ndarray:
         """Carried states (N, STATES, lanes) from coordinates and rates (2 joints, P or 1, R or 1)."""
         states = np.zeros((self.width, R.STATES, self.lanes))
+        if path is not None and path.carried is not None:
+            states[:] = path.carried.reshape(states.shape)
         shape = (2, len(self.plant.joints), self.models, self.inputs.windows)
         start = np.broadcast_to(initial.reshape(2, -1, *initial.shape[1:]), shape)
         states[self.joints, R.Q], states[self.joints, R.V] = start.reshape(*shape[:2], self.lanes)
@@ -91,7 +93,7 @@ class Layout:
 
     def led(self, path: Path | None) -> tuple[np.ndarray, np.ndarray]:
         """A path as the compiled code takes it, shape (rows, 2 N, lanes), and its last row in each window."""
-        if path is None:
+        if path is None or not len(path.states):
             return np.zeros((0, 2 * self.width, 1)), np.zeros(1, dtype=np.int64)
         rows, _, models, windows = path.states.shape
         states = np.zeros((rows, 2 * self.width, models * windows))
@@ -143,10 +145,16 @@ class Layout:
         """What each command has of `values` (K, N, lanes), shape (K, inputs, P, R)."""
         return values[:, self.driven].reshape(len(values), len(self.driven), self.models, self.inputs.windows)
 
-    def rollouts(self, out: np.ndarray, commands: np.ndarray, delivered: np.ndarray | None = None) -> Rollouts:
+    def rollouts(
+        self,
+        out: np.ndarray,
+        commands: np.ndarray,
+        delivered: np.ndarray | None = None,
+        carried: np.ndarray | None = None,
+    ) -> Rollouts:
         """Rollouts from what the sensors show, `out` (K + 1, 2 N, lanes)."""
         joints = self.joints  # slices, not copies
         shape = (self.rows + 1, joints.stop - joints.start, self.models, self.inputs.windows)
         coordinates = out[:, joints].reshape(shape)
         rates = out[:, self.width + joints.start : self.width + joints.stop].reshape(shape)
-        return Rollouts(coordinates, rates, commands, delivered)
+        return Rollouts(coordinates, rates, commands, delivered, carried)

@@ -156,6 +156,21 @@ def guide(B, lanes, k, lane0, count, path, until):
 
 
 @law
+def keep(B, lanes, k, lane0, count, places, carried):
+    """Store what each lane carries from step to step where `places` (rows, R) has a place for the row, not -1.
+
+    `carried` has the shape (N, STATES, P, places).
+    """
+    windows = places.shape[1]
+    for w in range(count):
+        place = places[k, lanes[0, w]]
+        if place >= 0:
+            for j in range(len(B)):
+                for i in range(R.STATES):
+                    carried[j, i, (lane0 + w) // windows, place] = B[j, i * W + w]
+
+
+@law
 def correct_past(past, t_rows, window, k, j, lane, way, rate, delay):
     """Move the course of coordinate j too, as far back as its sensor still shows it."""
     joints = past.shape[1] // 2

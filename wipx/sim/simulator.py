@@ -24,12 +24,15 @@ class Rollouts:
         commands: Commands of each row, shape (K, inputs, P, R) (R only open loop: (K, inputs, 1, R)).
         delivered: Mean force of the drives over each row, before what they cannot know (ripple, backlash, elasticity),
             shape (K, inputs, P, R) [N or N m]; None where it was not asked for.
+        carried: What joints carry from step to step at some rows (`wipx.sim.rows`), shape (N, STATES, P, W), each an
+            observer's row; None where none was asked for.
     """
 
     coordinates: np.ndarray
     rates: np.ndarray
     commands: np.ndarray
     delivered: np.ndarray | None = None
+    carried: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -50,15 +53,25 @@ class StateFeedback:
 
 @dataclass(frozen=True)
 class Path:
-    """Where rollouts are led before they are left to themselves, so that friction, lags and delays have settled.
+    """What rollouts have gone through before they are left to themselves: friction, lags and delays have settled.
 
     Attributes:
-        states: True coordinates, then rates, shape (rows, 2 joints, P or 1, R) [m, rad, m/s, rad/s].
+        states: True coordinates, then rates, shape (rows, 2 joints, P or 1, R) [m, rad, m/s, rad/s]; no rows where
+            rollouts are left to themselves from the start.
         until: Last row of each window at which its state is put on the path, shape (R,).
+        carried: What joints carry from earlier steps to the first integrated row, shape (N, STATES, P, R); None where
+            they begin there.
     """
 
     states: np.ndarray
     until: np.ndarray
+    carried: np.ndarray | None = None
+
+    @classmethod
+    def behind(cls, carried: np.ndarray) -> "Path":
+        """That of rollouts which are left to themselves from the start, by what joints carry to there."""
+        joints, _, _, windows = carried.shape
+        return cls(np.zeros((0, 2 * joints, 1, windows)), np.full(windows, -1), carried)
 
 
 class Simulator(Protocol):

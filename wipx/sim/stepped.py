@@ -196,7 +196,7 @@ class _Run:
             path: Where the rollouts are led at first.
         """
         led = self.layout.led(path)
-        states = self.layout.states(initial)
+        states = self.layout.states(initial, path)
         self.coefficients.on[R.ON_RAMP] = ramps is not None
         ramps = self.layout.held() if ramps is None else ramps
         out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))

@@ -1,16 +1,17 @@
 """What predictions of half a second see of a log."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
-from diagnosis.recorded import bench, forecasts
+from diagnosis.recorded import Bench, forecasts
+from diagnosis.recorded_arm import arm, recorded
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood import predictions
 from wipx.diagnosis.likelihood.predictions import condensed
-from wipx.effects.catalogue import vocabulary
-from wipx.identify.parameter_space import effect_parameters
-from wipx.sim.coefficients import must_be_led
 
 
 def test_a_fast_log_is_condensed_without_losing_time_or_level(fresh_seed: int):
@@ -26,21 +27,28 @@ def test_a_fast_log_is_condensed_without_losing_time_or_level(fresh_seed: int):
     np.testing.assert_allclose(short["u"][:-1], acting, atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", ["wip", "double_pendulum"])
-def test_models_that_need_not_be_led_to_a_start_predict_as_if_they_were(
-    kind: str, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
+SPRING = {"actuator_elbow/elasticity": {"drive_inertia": 0.02, "stiffness": 20.0, "damping": 0.02}}
+BRISTLE = {"elbow/presliding": {"F_c": 0.06, "stiffness": 30.0}}
+
+
+@pytest.mark.parametrize("hidden", [SPRING, BRISTLE], ids=["a drive on a spring", "a bent bristle"])
+def test_what_a_joint_carries_along_a_recording_is_there_where_a_prediction_starts(
+    hidden: dict[str, dict[str, float]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
 ):
-    case = bench(kind, {}, fresh_seed, count=2)
+    """A drive that swings for seconds on its spring, or a bristle that was bent at the last turn."""
+    model = arm(tmp_path)
+    true = model.with_effects(hidden)
+    case = Bench(model, tuple(recorded(true, fresh_seed + i, (0.2, 0.05)) for i in range(2)), {})
     seen = forecasts(case).predictions
-    filters = [seen.filtered(case.nominal, np.full(2, 10.0))]
-    for name in vocabulary(case.nominal.plant):
-        numbers = effect_parameters(name, case.nominal.plant, case.setting.scales)
-        model = case.nominal.with_effects({name: {p.name.rpartition(".")[2]: p.start for p in numbers}})
-        batch = ModelBatch(model)
-        if not must_be_led(batch):
-            own = seen.errors(batch, filters)
-            with monkeypatch.context() as patch:
-                patch.setattr(predictions, "must_be_led", lambda batch: True)
-                led = seen.errors(batch, filters)
-            np.testing.assert_allclose(own, led, rtol=0.01, atol=1.0, err_msg=name)  # the sensor noise
-            assert np.median(np.abs(own - led)) < 0.01, name
+
+    def error_of_elbow() -> float:
+        found = seen.errors(ModelBatch(true), [seen.filtered(true, np.full(2, 100.0))])[0]
+        return float(np.sqrt(np.mean(found[seen.counted, -1] ** 2)))
+
+    own, at_once = error_of_elbow(), predictions.starts_at_once
+
+    def at_rest(*seen: Any) -> tuple[np.ndarray, None]:
+        return at_once(*seen)[0], None
+
+    monkeypatch.setattr(predictions, "starts_at_once", at_rest)
+    assert own < 0.5 * error_of_elbow()

@@ -16,16 +16,16 @@ from wipx.core.results import HORIZON
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import Smoother
-from wipx.identify.starts import start_rows, starts_by, states_by
+from wipx.identify.starts import start_rows, starts_at_once, starts_by
 from wipx.identify.windows import LOOK_AHEAD, Windows, cut
 from wipx.sim.analytic import AnalyticSimulator
-from wipx.sim.coefficients import must_be_led
+from wipx.sim.coefficients import sensors_are_late
 from wipx.sim.inputs import Inputs
 
 HORIZONS = (0.0, 0.05, 0.15, HORIZON - LOOK_AHEAD)  # [s] after the rows that a start is estimated from; 0 for one row
 SPACING = 0.005  # [s] of the rows of condensed logs, about
 STRIDE = 0.25  # [s] from one start to the next
-LEAD = 0.1  # [s] of smoothed states before a start
+LEAD = 0.1  # [s] of smoothed states before a start, for what late sensors show at first
 LARGEST_CALL = 6_000_000  # numbers of one batch of rollouts, about 48 MB
 TOO_FAR = 5.0  # ranges of the recorded motion; what a prediction that fell over counts
 
@@ -137,11 +137,11 @@ class Predictions:
 
     def _shown(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
         """Coordinates that P models show in every row from each start on, shape (K + 1, joints, P, N)."""
-        if must_be_led(batch):
+        if sensors_are_late(batch):
             path = starts_by(self._smoother, self.windows, batch, filters).path(batch)
             return self.simulator.replay(batch, self.windows.inputs, path.states[0], path).coordinates
-        states = states_by(self._smoother, self.windows, batch, filters)
-        return self.simulator.replay(batch, self._from_starts, states).coordinates
+        states, path = starts_at_once(self._smoother, self.windows, batch, filters)
+        return self.simulator.replay(batch, self._from_starts, states, path).coordinates
 
     @cached_property
     def _from_starts(self) -> Inputs:
