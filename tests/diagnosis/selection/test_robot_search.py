@@ -10,6 +10,8 @@ from diagnosis.recorded_arm import arm, recorded
 from sim.random_trees import mjcf
 
 from wipx.core.plant import robot_plant
+from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.selection.criteria import evidence
 from wipx.diagnosis.selection.fit_store import FitStore
@@ -90,3 +92,45 @@ def test_what_one_joint_explains_does_not_raise_what_another_must_gain(tmp_path:
     smaller = search.store.without(both, "elbow/coulomb")
     assert evidence(smaller, both) < search.criteria.required_gain(smaller, both)
     assert search.pruned(both).fit is both
+
+
+LOOSE = {"actuator_elbow/elasticity": {"drive_inertia": 0.01, "stiffness": 4.0, "damping": 0.01}}
+IMITATION = ("elbow/spring", "sensor_elbow/delay", "link_lower/com_offset")
+
+
+@pytest.mark.parametrize("hidden", [LOOSE, FRICTION], ids=["a loose drive", "friction"])
+def test_what_was_there_before_a_drive_proved_loose_goes_if_it_explains_less(
+    hidden: dict[str, dict[str, float]], tmp_path: Path, fresh_seed: int
+):
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects(hidden), fresh_seed, (0.2, 0.05)),), {})
+    nominal = case.fit()
+    search = RobotSearch.of(FitStore.of(case.fitter, case.setting, nominal), nominal)
+    before, larger = (_fitted(case, nominal, effects, hidden) for effects in (IMITATION, (*IMITATION, *hidden)))
+    kept = tuple(hidden) if hidden is LOOSE else larger.effects
+    assert search.freed(before, larger).effects == kept
+
+
+PENDULUM = """<mujoco><worldbody><body name="rod"><inertial pos="0 0 -0.2" mass="0.5" diaginertia="0.01 0.01 0.001"/>
+<joint name="pivot" axis="0 1 0" damping="0.02"/></body></worldbody></mujoco>"""
+ABOVE = {"link_rod/payload": {"mass": 0.3, "z": 0.2}, "pivot/spring": {"k": 0.6}}
+
+
+def test_an_effect_takes_the_place_of_that_of_another_part_while_what_is_beside_it_gives_way(
+    tmp_path: Path, fresh_seed: int
+):
+    """A load above a pivot and a spring that holds it up move like a rotor, which needs no spring."""
+    model = arm(tmp_path, PENDULUM)
+    case = Bench(model, (recorded(model.with_effects({"pivot/rotor_inertia": {"J": 0.02}}), fresh_seed, (0.3,)),), {})
+    nominal = case.fit()
+    search = RobotSearch.of(FitStore.of(case.fitter, case.setting, nominal), nominal)
+    whole = search.store.keep(_fitted(case, nominal, tuple(ABOVE), ABOVE))
+    lead, held = search.replaced_across(whole, "link_rod/payload", "pivot/rotor_inertia")
+    assert set(held.effects) == {"pivot/spring", "pivot/rotor_inertia"}
+    assert lead > 100.0
+
+
+def _fitted(case: Bench, nominal: Fit, effects: tuple[str, ...], values: dict[str, dict[str, float]]) -> Fit:
+    """The fit of some effects from some values of them on, with the noise of the nominal model at first."""
+    start = {f"{name}.{symbol}": value for name, own in values.items() for symbol, value in own.items()}
+    return case.fitter.first_fit(Hypothesis.of(case.setting, effects, start), nominal.levels)

@@ -148,11 +148,11 @@ class FitStore:
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
         """Fits with another effect in the place of one, the best first."""
         base = self.without(fit, effect)
-        others = [self._with_one_from_elsewhere(base, name) for name in self.elsewhere.get(effect, ())]
+        others = [self.extended_by(base, name) for name in self.elsewhere.get(effect, ())]
         return sorted([*self.extensions(base), *filter(None, others)], key=lambda found: -score(found, base))
 
-    def _with_one_from_elsewhere(self, base: Fit, name: str) -> Fit | None:
-        """A fit with an effect at another site; None where the others leave nothing for it to explain."""
+    def extended_by(self, base: Fit, name: str) -> Fit | None:
+        """A fit with one certain effect more; None where the others leave nothing for it to explain."""
         known = self._fits.get(frozenset((*base.effects, name)))
         found = known or self._started(base, name)
         return self.keep(found) if found else None
