@@ -180,7 +180,7 @@ class _Run:
         self.past = self.layout.past(self.coefficients.has)
         self.delivered = self.layout.held()
         self.places = np.full((0, 1), -1)
-        self.carried = np.zeros((1, R.STATES, 1, 0))
+        self.kept, self.carried = np.zeros(0, dtype=np.int64), np.zeros((1, R.STATES, 1, 0))
 
     def begin(self, initial: np.ndarray) -> int:
         """Row from which a replay must be simulated: that of the first step, where no sensor looks further back."""
@@ -196,10 +196,11 @@ class _Run:
         self.delivered = np.zeros((self.layout.rows, self.layout.width, self.layout.lanes))
 
     def keep(self, rows: np.ndarray, windows: np.ndarray) -> None:
-        """Keep what joints carry at some rows (W,) of windows (W,), no row twice."""
+        """Keep what joints carry at some rows (W,) of windows (W,)."""
         self.places = np.full(self.inputs.t.shape, -1)
-        self.places[rows, windows] = np.arange(len(rows))
-        self.carried = np.zeros((self.layout.width, R.STATES, self.layout.models, len(rows)))
+        once, self.kept = np.unique(np.ravel_multi_index((rows, windows), self.places.shape), return_inverse=True)
+        self.places.ravel()[once] = np.arange(len(once))
+        self.carried = np.zeros((self.layout.width, R.STATES, self.layout.models, len(once)))
 
     def advance(
         self, states, first_row, last_row, commands=None, loop: ClosedLoop | None = None, observer=None, path=None
@@ -291,4 +292,6 @@ class _Run:
     def rollouts(self, commands: np.ndarray) -> Rollouts:
         reported = self.coefficients.on[R.ON_REPORT]
         delivered = self.layout.per_command(self.delivered) if reported else None
-        return self.layout.rollouts(self.out, commands, delivered, self.carried if len(self.places) else None)
+        return self.layout.rollouts(
+            self.out, commands, delivered, self.carried[..., self.kept] if len(self.places) else None
+        )
