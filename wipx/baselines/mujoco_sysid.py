@@ -21,7 +21,7 @@ from wipx.baselines.mujoco_problem import DIFFERENCE, Toolbox, ToolboxProblem, i
 from wipx.baselines.mujoco_selection import MujocoSelection
 from wipx.baselines.prediction_search import PredictionSearch, at
 from wipx.core.errors import InputError, check_positive
-from wipx.effects.catalogue import vocabulary
+from wipx.effects.catalogue import alike
 
 FIRST_SHARE = 0.5  # of the time, for all numbers; the rest for those that are kept
 ROUND = 2  # Gauss-Newton steps between two looks at the clock
@@ -114,18 +114,8 @@ def _fitted(problem: ToolboxProblem, start: np.ndarray, deadline: float) -> _Fit
 
 
 def _found(case: Problem, name: str, values: dict[str, float], weight: float) -> Found:
-    return Found(name, values, weight, tuple(other for other in _equivalent(case, name) if other in case.vocabulary))
-
-
-def _equivalent(case: Problem, name: str) -> tuple[str, ...]:
-    """Effects that no recording tells from one of the toolbox's."""
-    alike = [other for other, effect in vocabulary(case.nominal.plant).items() if name in effect.indistinguishable]
-    if alike:
-        return tuple(alike)
-    if name.endswith("/delay") and len(case.nominal.plant.joints) == 1:  # nothing else shows when the drive acts
-        sites = ("actuator", *(f"sensor_{column}" for column in case.nominal.plant.coordinates))
-        return tuple(f"{site}/delay" for site in sites if f"{site}/delay" != name)
-    return ()
+    same = alike(case.nominal.plant).get(name, ())
+    return Found(name, values, weight, tuple(other for other in same if other in case.vocabulary))
 
 
 def _notes(case: Problem) -> tuple[str, ...]:

@@ -191,7 +191,7 @@ class Effect:
         made_of: The simpler laws that it is the sum of in a limit.
         extends: The law of the vocabulary that it generalises.
         with_constant: What it is together with a constant force.
-        indistinguishable: Effects "site/kind" that no recording tells from it.
+        indistinguishable: Effects "site/kind" that no recording tells from it; told of one of them.
     """
 
     kind: str

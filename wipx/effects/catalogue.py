@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from itertools import combinations
 from pkgutil import iter_modules
 from types import ModuleType
 
@@ -91,6 +92,23 @@ def effect_of(name: str, plant: Plant, where: str = "effects") -> Effect:
     if name not in known:
         raise unknown_name(f"effect of plant {plant.kind}", name, known, where)
     return known[name]
+
+
+def alike(plant: Plant) -> dict[str, tuple[str, ...]]:
+    """Effects of a plant that no recording tells apart, by each of them.
+
+    If a robot has one joint, what a late drive makes it do is what a late sensor shows of it: its motion under past
+    commands.
+    """
+    known = vocabulary(plant)
+    pairs = [(name, other) for name, effect in known.items() for other in effect.indistinguishable if other in known]
+    if len(plant.joints) == 1:
+        pairs += combinations([name for name in known if name.endswith("/delay")], 2)
+    found: dict[str, tuple[str, ...]] = {}
+    for one, other in pairs:
+        found[one] = (*found.get(one, ()), other)
+        found[other] = (*found.get(other, ()), one)
+    return found
 
 
 def check_together(names: tuple[str, ...], plant: Plant, where: str = "effects") -> None:

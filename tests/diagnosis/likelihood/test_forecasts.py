@@ -146,7 +146,7 @@ def test_a_late_drive_and_a_late_sensor_of_one_joint_are_one(hidden: str, fresh_
     )
     fitter = forecasts(case)
     nominal = fitter.first_fit(Hypothesis.of(case.setting, (), {}))
-    store = replace(FitStore.of(fitter, case.setting, nominal), elsewhere=fitter.alike)
+    store = FitStore.of(fitter, case.setting, nominal)
     drive, sensor = (store.fitted((name,), nominal) for name in ("actuator/delay", "sensor_theta/delay"))
     for fit in (drive, sensor):
         assert fit.hypothesis.cube == pytest.approx(drive.hypothesis.cube, abs=0.02)

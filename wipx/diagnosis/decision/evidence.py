@@ -150,7 +150,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit, *, afre
     setting, least_gain = context.setting, context.rules.selection.least_gain
     ahead = replace(context, fitter=fitter)
     nominal = fitter.first_fit(Hypothesis.of(setting, (), {}))
-    search = search_of(replace(FitStore.of(fitter, setting, nominal), elsewhere=fitter.alike), nominal)
+    search = search_of(FitStore.of(fitter, setting, nominal), nominal)
     criteria = search.criteria
     if isinstance(search, RobotSearch):
         best = search.run(search.fit_from(chosen) if chosen.effects and not afresh else None)

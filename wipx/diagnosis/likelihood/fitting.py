@@ -18,6 +18,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import EvidenceRules, Rules
+from wipx.effects.catalogue import alike
 from wipx.sim.analytic import AnalyticSimulator
 
 if TYPE_CHECKING:
@@ -156,6 +157,16 @@ class Fitter(ABC):
     @abstractmethod
     def data(self) -> RecordingBatch:
         """The recordings."""
+
+    @cached_property
+    def alike(self) -> dict[str, tuple[str, ...]]:
+        """Effects that no recording tells apart, by each of them."""
+        return alike(self.data.plant)
+
+    def are_alike(self, fit: Fit, other: Fit) -> bool:
+        """Whether fits differ by one effect only, in whose place no recording tells them apart."""
+        exchanged = sorted(set(fit.effects) ^ set(other.effects))
+        return len(exchanged) == 2 and exchanged[1] in self.alike.get(exchanged[0], ())
 
     @property
     @abstractmethod

@@ -294,25 +294,13 @@ class ForecastFitter(Fitter):
         """Its lead on held-out stretches, beside numbers in doubt, and in the odds that it has beforehand."""
         return float(np.sum(self._held_out(fit) - self._held_out(other))) + fit.odds - other.odds
 
-    @cached_property
-    def alike(self) -> dict[str, tuple[str, ...]]:
-        """Effects that no recording tells apart, by each of them.
-
-        If a robot has one joint, what a late drive makes it do is what a late sensor shows of it: both are its motion
-        under past commands. A sensor's forecasts end earlier in its motion, and err less for that reason alone.
-        """
-        late = (
-            [name for name in vocabulary(self.data.plant) if name.endswith("/delay")] if self.data.joints == 1 else []
-        )
-        return {name: tuple(other for other in late if other != name) for name in late}
-
     def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
         """As stretches of time agree on it (Vuong 1989): where no law holds, one predicts this better, another that.
 
-        Numbers that a fit has more than the rival cost it their penalty.
+        Numbers that a fit has more than the rival cost it their penalty. Forecasts of a late sensor end earlier in a
+        motion than those of a late drive, and err less for that reason alone.
         """
-        exchanged = sorted(set(fit.effects) ^ set(rival.effects))
-        if len(exchanged) == 2 and exchanged[1] in self.alike.get(exchanged[0], ()):
+        if self.are_alike(fit, rival):
             return 0.0
         differences = self._likelihoods(fit) - self._likelihoods(rival)
         lead -= 0.5 * max(len(fit.hypothesis.cube) - len(rival.hypothesis.cube), 0) * float(np.log(self.rows))

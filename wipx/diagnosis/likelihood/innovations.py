@@ -119,6 +119,8 @@ class InnovationFitter(Fitter):
 
     def separation(self, fit: Fit, rival: Fit, lead: float, overstated: float) -> float:
         """As if one number more made the difference: a likelihood ratio."""
+        if self.are_alike(fit, rival):
+            return 0.0
         return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
 
     def asks_for_force(self, levels: NoiseLevels, scales: Mapping[str, Scales]) -> np.ndarray:

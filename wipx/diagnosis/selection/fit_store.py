@@ -148,8 +148,11 @@ class FitStore:
     def replacements(self, fit: Fit, effect: str) -> list[Fit]:
         """Fits with another effect in the place of one, the best first."""
         base = self.without(fit, effect)
-        others = [self.extended_by(base, name) for name in self.elsewhere.get(effect, ())]
-        return sorted([*self.extensions(base), *filter(None, others)], key=lambda found: -score(found, base))
+        found = list(self.extensions(base))
+        known = {*base.effects, *(other.effects[-1] for other in found)}
+        names = {*self.elsewhere.get(effect, ()), *self.fitter.alike.get(effect, ())} - known
+        found += filter(None, (self.extended_by(base, name) for name in sorted(names)))
+        return sorted(found, key=lambda other: -score(other, base))
 
     def extended_by(self, base: Fit, name: str) -> Fit | None:
         """A fit with one certain effect more; None where the others leave nothing for it to explain."""
