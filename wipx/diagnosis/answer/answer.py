@@ -274,8 +274,12 @@ def proposed(
     rng: np.random.Generator,
     limits: Mapping[str, JointLimits] | None = None,
 ) -> NextExperiment | None:
-    """The experiment that settles what is tied or weak; None where nothing is."""
-    tied = {effect.name: effect.equivalent for effect in answer.effects}
+    """The experiment that settles what is tied or weak; None where nothing is, or nothing that an experiment tells."""
+    forever = context.fitter.alike
+    tied = {
+        effect.name: tuple(name for name in effect.equivalent if name not in forever.get(effect.name, ()))
+        for effect in answer.effects
+    }
     rivals = [
         part.store.fitter.seen_by_row(other)[1]
         for part, own in search.split(fit, with_stand_ins=True)
