@@ -180,7 +180,7 @@ def _with_minor_effects(end: Found) -> Found:
     """
     search, further = _completed_and_grown(end.search, end.rest.fit)
     further = _without_harm(end.context, search, further)
-    whole = further.fit
+    whole = _simplified(search, further.fit)
     kept = _by_part(search, whole, dominant)
     considered = end.rest.considered + further.considered + tuple(each for chosen in kept for each in chosen.considered)
     named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
@@ -215,8 +215,12 @@ def _without_harm(context: Context, search: Search, chosen: Chosen) -> Chosen:
         return chosen
     kept = _by_part(search, fit, lambda part, own: transferring(context.held_out, part, own))
     considered = chosen.considered + tuple(each for one in kept for each in one.considered)
-    changed = any(one.fit is not own for one, (_, own) in zip(kept, search.split(fit), strict=True))
-    return Chosen(search.joined(fit, tuple(one.fit for one in kept)) if changed else fit, considered)
+    return Chosen(_joined(search, fit, [one.fit for one in kept]), considered)
+
+
+def _simplified(search: Search, fit: Fit) -> Fit:
+    """A fit without rich laws that nothing tells from the simple ones which they contain."""
+    return _joined(search, fit, _by_part(search, fit, lambda part, own: part.simplified(own)))
 
 
 def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:
@@ -224,14 +228,18 @@ def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:
     fitter = search.store.fitter
     assert isinstance(fitter, ForecastFitter)
     search = search.knowing(tolerances(search.store.setting, fitter, fitter.predictions, fit))
-    better = _by_part(search, fit, completed)
-    changed = any(new is not old for new, (_, old) in zip(better, search.split(fit), strict=True))
-    return search, search.joined(fit, tuple(better)) if changed else fit
+    return search, _joined(search, fit, _by_part(search, fit, completed))
 
 
 def _by_part(search: Search, fit: Fit, do: Callable[[Search, Fit], Done]) -> list[Done]:
     """What is done with each part of a robot that has effects, side by side."""
     return search.store.fitter.simulator.side_by_side(lambda piece: do(*piece), search.split(fit))
+
+
+def _joined(search: Search, fit: Fit, parts: list[Fit]) -> Fit:
+    """The fit of a robot with what its parts have become; the same fit where none has changed."""
+    changed = any(new is not old for new, (_, old) in zip(parts, search.split(fit), strict=True))
+    return search.joined(fit, tuple(parts)) if changed else fit
 
 
 def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:

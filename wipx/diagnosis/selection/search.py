@@ -170,6 +170,18 @@ class Search:
             best = found if score(found, base) > score(best, base) else best
         return best
 
+    def simplified(self, fit: Fit) -> Fit:
+        """A fit in which rich laws have given way to the simple ones that they contain, where nothing tells them apart.
+
+        What tells them apart while a search goes on may be gone beside the effects that it ends with.
+        """
+        for effect in named_effects(fit):
+            reduced = self.store.with_reduced_law(fit, effect)
+            plain = self.store.escaped(reduced) if reduced is not None else fit
+            if plain is not fit and not self.criteria.tells_apart(fit, plain):
+                return self.simplified(plain)
+        return fit
+
     def pruned(self, fit: Fit) -> Chosen:
         """Without the effects that the latest one made superfluous."""
         for effect in named_effects(fit) if len(fit.effects) > 1 else ():
