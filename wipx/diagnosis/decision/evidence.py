@@ -180,13 +180,15 @@ def _with_minor_effects(end: Found) -> Found:
     """
     search, further = _completed_and_grown(end.search, end.rest.fit)
     further = _without_harm(end.context, search, further)
-    whole = _simplified(search, further.fit)
+    whole = further.fit
     kept = _by_part(search, whole, dominant)
     considered = end.rest.considered + further.considered + tuple(each for chosen in kept for each in chosen.considered)
     named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
     if not named and end.rest.fit.effects:
         search, whole = _completed(end.search, end.search.nominal)
-    minor = tuple(effect for effect in whole.effects if effect not in named)
+    small = {effect for effect in whole.effects if effect not in named}
+    whole = _joined(search, whole, _by_part(search, whole, lambda part, own: part.simplified(own, named)))
+    minor = tuple(effect for effect in whole.effects if effect in small)
     context = replace(end.context, setting=search.store.setting)
     if whole is end.rest.fit:
         return Found(context, search, replace(end.rest, minor=minor, considered=considered), end.shapes)
@@ -216,11 +218,6 @@ def _without_harm(context: Context, search: Search, chosen: Chosen) -> Chosen:
     kept = _by_part(search, fit, lambda part, own: transferring(context.held_out, part, own))
     considered = chosen.considered + tuple(each for one in kept for each in one.considered)
     return Chosen(_joined(search, fit, [one.fit for one in kept]), considered)
-
-
-def _simplified(search: Search, fit: Fit) -> Fit:
-    """A fit without rich laws that nothing tells from the simple ones which they contain."""
-    return _joined(search, fit, _by_part(search, fit, lambda part, own: part.simplified(own)))
 
 
 def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:

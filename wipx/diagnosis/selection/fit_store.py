@@ -4,7 +4,7 @@ What is preferred is decided elsewhere (`criteria`, `search`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -91,6 +91,25 @@ class FitStore:
         """Keep a fit as the best of its effects, and return it."""
         self._fits[frozenset(fit.effects)] = fit
         return fit
+
+    def branch(self) -> "FitStore":
+        """A store that knows the same fits; further ones it keeps to itself until they are adopted.
+
+        Where a fit starts depends on what is known. So work that is done side by side must not share what it finds.
+        """
+        return replace(
+            self, _fits=dict(self._fits), _extensions=dict(self._extensions), _candidates=dict(self._candidates)
+        )
+
+    def adopt(self, branch: "FitStore") -> None:
+        """Take what a branch has found, and the better one of two fits of the same effects."""
+        for effects, fit in branch._fits.items():
+            known = self._fits.get(effects, fit)
+            self._fits[effects] = fit if fit.log_likelihood > known.log_likelihood else known
+        for effects, extensions in branch._extensions.items():
+            self._extensions.setdefault(effects, extensions)
+        for key, candidates in branch._candidates.items():
+            self._candidates.setdefault(key, candidates)
 
     def fitted(self, effects: tuple[str, ...], start: Fit) -> Fit:
         """The fit of some effects; where there is none yet, from the values and noise of another fit on."""

@@ -5,9 +5,8 @@ is explained already, so that what a law misses is not filled up with further ef
 and what it considered; fits are kept in a `FitStore`, and `Criteria` decide between them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar, Self
 
 from wipx.core.diagnosis import ConsideredEffect
@@ -170,16 +169,16 @@ class Search:
             best = found if score(found, base) > score(best, base) else best
         return best
 
-    def simplified(self, fit: Fit) -> Fit:
-        """A fit in which rich laws have given way to the simple ones that they contain, where nothing tells them apart.
+    def simplified(self, fit: Fit, effects: Collection[str]) -> Fit:
+        """A fit in which some rich laws give way to the simple ones that they contain, where nothing tells them apart.
 
         What tells them apart while a search goes on may be gone beside the effects that it ends with.
         """
-        for effect in named_effects(fit):
+        for effect in (name for name in fit.effects if name in effects):
             reduced = self.store.with_reduced_law(fit, effect)
             plain = self.store.escaped(reduced) if reduced is not None else fit
             if plain is not fit and not self.criteria.tells_apart(fit, plain):
-                return self.simplified(plain)
+                return self.simplified(plain, effects)
         return fit
 
     def pruned(self, fit: Fit) -> Chosen:
@@ -199,7 +198,7 @@ class Search:
         considered: History = ()
         for _ in range(self.exchanges):
             best, most = fit, self.rules.least_lead
-            for base, found in self.store.side_by_side(partial(self._replaced, fit), named_effects(fit)):
+            for base, found in self._each_replaced(fit):
                 lead = most if found is None else self.criteria.lead(found, fit)
                 if found is not None and lead > most and self.criteria.gains_enough(base, found):
                     best, most = found, lead
@@ -211,6 +210,15 @@ class Search:
             pruned = self.pruned(self.store.restarted(self.store.keep(best), best.effects[-1]))
             fit, considered = pruned.fit, considered + pruned.considered
         return Chosen(fit, considered)
+
+    def _each_replaced(self, fit: Fit) -> list[tuple[Fit, Fit | None]]:
+        """What `_replaced` tells of each effect, whichever is done first."""
+        branches = [replace(self, store=self.store.branch()) for _ in named_effects(fit)]
+        pairs = list(zip(branches, named_effects(fit), strict=True))
+        found = self.store.side_by_side(lambda pair: pair[0]._replaced(fit, pair[1]), pairs)
+        for branch in branches:
+            self.store.adopt(branch.store)
+        return found
 
     def _replaced(self, fit: Fit, effect: str) -> tuple[Fit, Fit | None]:
         """The fit without an effect, and the best one with another in its place; None where there is none."""
