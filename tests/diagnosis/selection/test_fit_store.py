@@ -38,3 +38,19 @@ def test_an_effect_of_which_screening_expects_little_is_fitted_if_its_start_expl
     fits = FitStore.of(fitter, case.setting, nominal).extensions(nominal)
     assert len(fits) < len({each.effect for each in screened})
     assert fits[0].effects == ("sensor_theta/delay",)
+
+
+def test_a_branch_keeps_its_fits_to_itself_until_they_are_adopted(fresh_seed: int):
+    """Where a fit starts depends on what is known; work side by side must not depend on what is done first."""
+    case = bench("linear_axis", {"translation/coulomb": {"F_c": 1.0}}, fresh_seed)
+    store = FitStore.of(case.fitter, case.setting, case.fit())
+    branch = store.branch()
+    found = branch.fitted(("translation/coulomb",), branch.nominal)
+    assert branch.fitted(("translation/coulomb",), branch.nominal) is found
+    assert store.branch().fitted(("translation/coulomb",), store.nominal) is not found
+    store.adopt(branch)
+    assert store.fitted(("translation/coulomb",), store.nominal) is found
+    worse = store.branch()
+    worse.keep(replace(found, log_likelihood=found.log_likelihood - 1.0))
+    store.adopt(worse)
+    assert store.fitted(("translation/coulomb",), store.nominal) is found
