@@ -14,7 +14,7 @@ import numpy as np
 from wipx.baselines.case import Answer, Found, Problem, excluded
 from wipx.baselines.prediction_search import PredictionSearch, at, needed
 from wipx.core.errors import check_positive
-from wipx.effects.catalogue import effect_of, kind_of
+from wipx.effects.catalogue import alike, effect_of, kind_of
 from wipx.identify.parameter_space import ParameterSpace
 from wipx.identify.problem import WindowProblem
 
@@ -57,7 +57,10 @@ class AllAtOnce:
         cube = self._minimise(lean, start, begun + budget, rng)
         model = at(lean.space, cube)
         weights = needed(lean, cube, kept)
-        found = tuple(_named(name, dict(model.effects[name]), weight) for name, weight in weights.items())
+        same = alike(model.plant)
+        found = tuple(
+            _named(name, dict(model.effects[name]), weight, same.get(name, ())) for name, weight in weights.items()
+        )
         return Answer(model, found, bool(found))
 
     def _minimise(
@@ -87,8 +90,8 @@ def _all_together(case: Problem) -> tuple[str, ...]:
     """Effects that can act together, as many as possible; one for those that no recording tells apart."""
     names, plant = case.vocabulary, case.nominal.plant
     frictions = tuple(name for name in names if kind_of(name).kind == DRY_FRICTION)
-    alike = {other for name in names for other in kind_of(name).indistinguishable}
-    return tuple(name for name in names if name not in alike and not excluded(name, frictions, plant))
+    same = {other for name in names for other in kind_of(name).indistinguishable}
+    return tuple(name for name in names if name not in same and not excluded(name, frictions, plant))
 
 
 def _undisturbed(space: ParameterSpace) -> np.ndarray:
@@ -103,8 +106,8 @@ def _is_size(name: str, space: ParameterSpace) -> bool:
     return not linear or symbol in linear
 
 
-def _named(name: str, values: dict[str, float], weight: float) -> Found:
+def _named(name: str, values: dict[str, float], weight: float, equivalent: tuple[str, ...]) -> Found:
     site, _, kind = name.partition("/")
     if kind == "stribeck" and values["F_s"] < (1.0 + NO_PEAK) * values["F_c"]:
         return Found(f"{site}/coulomb", {"F_c": values["F_c"]}, weight)
-    return Found(name, values, weight, kind_of(name).indistinguishable)
+    return Found(name, values, weight, equivalent)

@@ -187,7 +187,9 @@ def _with_minor_effects(end: Found) -> Found:
     if not named and end.rest.fit.effects:
         search, whole = _completed(end.search, end.search.nominal)
     small = {effect for effect in whole.effects if effect not in named}
-    whole = _joined(search, whole, _by_part(search, whole, lambda part, own: part.simplified(own, named)))
+    simple = _by_part(search, whole, lambda part, own: part.simplified(own, named))
+    whole = _joined(search, whole, [chosen.fit for chosen in simple])
+    considered += tuple(each for chosen in simple for each in chosen.considered)
     minor = tuple(effect for effect in whole.effects if effect in small)
     context = replace(end.context, setting=search.store.setting)
     if whole is end.rest.fit:

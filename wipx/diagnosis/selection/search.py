@@ -169,7 +169,7 @@ class Search:
             best = found if score(found, base) > score(best, base) else best
         return best
 
-    def simplified(self, fit: Fit, effects: Collection[str]) -> Fit:
+    def simplified(self, fit: Fit, effects: Collection[str]) -> Chosen:
         """A fit in which some rich laws give way to the simple ones that they contain, where nothing tells them apart.
 
         What tells them apart while a search goes on may be gone beside the effects that it ends with.
@@ -178,8 +178,10 @@ class Search:
             reduced = self.store.with_reduced_law(fit, effect)
             plain = self.store.escaped(reduced) if reduced is not None else fit
             if plain is not fit and not self.criteria.tells_apart(fit, plain):
-                return self.simplified(plain, effects)
-        return fit
+                reason = "nothing tells it from the simple law that it contains"
+                considered = (ConsideredEffect(effect, evidence(plain, fit), False, reason),)
+                return self.simplified(plain, effects).after(considered)
+        return Chosen(fit)
 
     def pruned(self, fit: Fit) -> Chosen:
         """Without the effects that the latest one made superfluous."""
