@@ -10,6 +10,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.model import Model, ModelBatch
 from wipx.core.tree import Link, ModelFile, Tree
+from wipx.recordings.model_specification import release_locked
 from wipx.recordings.robot_model import read_tree
 from wipx.sim.mechanism import LEAST, mechanism
 from wipx.sim.tree.frames import principal
@@ -62,14 +63,10 @@ def owner_file(model: Model, mujoco: Any) -> OwnerFile:
 
 
 def _lock(mujoco: Any, spec: Any, joints: tuple[str, ...]) -> None:
-    """Fix joints at zero: they go, with their actuators, their sensors and their places in keyframes."""
+    """Fix joints at zero: they go, with what acts on them only and with their places in keyframes."""
     if joints:
         spec.compile()  # keyframes of a compiled specification follow what is deleted
-    in_joint, joint_type = mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtObj.mjOBJ_JOINT
-    for each in [one for one in spec.actuators if one.trntype == in_joint and one.target in joints]:
-        spec.delete(each)
-    for each in [sensor for sensor in spec.sensors if sensor.objtype == joint_type and sensor.objname in joints]:
-        spec.delete(each)
+    release_locked(mujoco, spec, joints)
     for name in joints:
         spec.delete(spec.joint(name))
 

@@ -156,7 +156,7 @@ class SpecWriter:
         tree = self.model.plant.tree
         if not self.own or terms.statements or tree is None or tree.source is None:
             return False
-        file = read_drives(tree.source.path).get(terms.joint)
+        file = read_drives(tree.source.path, tree.source.locked).get(terms.joint)
         own, parameters = self.model.plant.drives[terms.joint], self.model.parameters
         if file is None or file.kind != own.kind or file.limit != own.limit:
             return False

@@ -1,16 +1,15 @@
 """MJCF and URDF files as trees; MuJoCo reads both."""
 
-import importlib
-import re
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
 from wipx.core.drive import Drive
 from wipx.core.errors import InputError
 from wipx.core.tree import Link, ModelFile, Tree
+from wipx.recordings.model_specification import compiled_model, urdf_root
 from wipx.recordings.tree_names import check_names
 
 
@@ -24,21 +23,20 @@ def read_tree(path: Path, locked: dict[str, float] | None = None) -> Tree:
         locked: Joints that are fixed, with their positions [rad or m]; their links join those below.
 
     Raises:
-        InputError: the file is missing or no such file, MuJoCo is not installed, or the robot is no open tree of hinges
-            and slides on a fixed base.
+        InputError: as `compiled_model`, or a joint moves no mass, or a name clashes with a column's.
     """
-    mujoco = _mujoco(path)
-    return _tree(mujoco, _model(mujoco, path), dict(locked or {}), path)
+    locked = dict(locked or {})
+    mujoco, model = compiled_model(path, locked)
+    return _tree(mujoco, model, locked, path)
 
 
-def read_drives(path: Path) -> dict[str, Drive]:
-    """The actuators of a model file as drives, by joint.
+def read_drives(path: Path, locked: Collection[str] = ()) -> dict[str, Drive]:
+    """The actuators of a model file as drives, by joint; those of locked joints are left out.
 
     Raises:
-        InputError: as `read_tree`; or an actuator is neither a motor nor a position servo of one joint.
+        InputError: as `compiled_model`, or an actuator is neither a motor nor a position servo of one joint.
     """
-    mujoco = _mujoco(path)
-    model = _model(mujoco, path)
+    mujoco, model = compiled_model(path, locked)
     found: dict[str, Drive] = {}
     for i in range(model.nu):
         gain, bias, gear = model.actuator_gainprm[i], model.actuator_biasprm[i], model.actuator_gear[i]
@@ -62,102 +60,6 @@ def read_drives(path: Path) -> dict[str, Drive]:
         else:
             found[joint] = Drive("position", kp=float(gain[0]), kd=float(-bias[2]), limit=limit)
     return found
-
-
-def _model(mujoco: Any, path: Path) -> Any:
-    """The compiled model of a file."""
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of an MJCF or URDF file relative to robot.yaml")
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path}: {_in_words(error)}; expected an MJCF or URDF file") from error
-    _strip(mujoco, spec, path)
-    try:
-        model = spec.compile()
-    except ValueError as error:
-        raise InputError(f"{path}: {_in_words(error)}; correct the file") from error
-    _refuse(model, path)
-    return model
-
-
-def _mujoco(path: Path) -> Any:
-    try:
-        return importlib.import_module("mujoco")
-    except ModuleNotFoundError as error:
-        raise InputError(f'{path} is read by MuJoCo, which is not installed; pip install "mujoco>=4.0,<5"') from error
-
-
-def _in_words(error: Exception) -> str:
-    """What MuJoCo says of a file, in one line."""
-    text = str(error).strip() or type(error).__name__
-    element = re.search(r"Element name '([^']*)'", text)
-    body = f"body {element.group(1)}" if element else "a body"
-    line = re.search(r"Line number=(\d+)", text)
-    if line is not None:
-        return f"line {line.group(1)} is not XML"
-    if "mjMINVAL" in text:
-        return f"{body} moves and has no mass or no inertia; give it an inertial with both above zero"
-    if "A + B >= C" in text:
-        return f"{body} has an inertia that no body can have: one principal moment exceeds the sum of the other two"
-    return text.splitlines()[0].rstrip(".;") + (f" ({body})" if element else "")
-
-
-def _strip(mujoco: Any, spec: Any, path: Path) -> None:
-    """Leave only what moves: joints, inertias and actuators."""
-    _refuse_joints(mujoco, spec, path)
-    lists = (spec.sensors, spec.keys, spec.pairs, spec.excludes, spec.lights, spec.cameras)
-    _delete(spec, *lists)
-    for body in spec.bodies[1:]:
-        mesh = mujoco.mjtGeom.mjGEOM_MESH
-        _delete(spec, [geom for geom in body.geoms if body.explicitinertial or geom.type == mesh])
-    _delete(spec, spec.skins, spec.meshes, spec.hfields, spec.materials, spec.textures)
-
-
-def _delete(spec: Any, *lists: Any) -> None:
-    for each in (item for many in lists for item in list(many)):
-        spec.delete(each)
-
-
-def _refuse_joints(mujoco: Any, spec: Any, path: Path) -> None:
-    """Refuse what is no hinge or slide, and what closes a loop."""
-    named = {mujoco.mjtJoint.mjJNT_FREE: "free", mujoco.mjtJoint.mjJNT_BALL: "ball"}
-    for joint in spec.joints:
-        if joint.type in named:
-            raise InputError(
-                f"{path}: joint {joint.name or 'without a name'} is a {named[joint.type]} joint, expected hinges and "
-                f"slides on a fixed base; a base that moves in the plane is a slide and a hinge"
-            )
-    if spec.equalities:
-        first = spec.equalities[0]
-        names = " and ".join(name for name in (first.name1, first.name2) if name)
-        raise InputError(
-            f"{path}: {names or first.name or 'two bodies'} are coupled (a closed loop, a coupling of joints or a "
-            f"mimic joint), expected an open tree; remove the coupling from the file"
-        )
-    if spec.tendons:
-        raise InputError(f"{path}: tendon {spec.tendons[0].name or 1} is not supported; remove it from the file")
-
-
-def _refuse(model: Any, path: Path) -> None:
-    """Refuse what no tree of rigid links is."""
-    if model.njnt == 0:
-        raise InputError(f"{path}: the model has no joint that moves")
-    for j in range(model.njnt):
-        name = model.joint(j).name
-        if not name:
-            raise InputError(f"{path}: a joint of body {model.body(model.jnt_bodyid[j]).name} has no name; give it one")
-        dof = int(model.jnt_dofadr[j])
-        if np.any(model.dof_dampingpoly[dof] != 0.0):
-            raise InputError(
-                f"{path}: joint {name} has damping beyond the linear coefficient; "
-                f"remove that and add the effect {name}/quadratic_drag instead"
-            )
-        if np.any(model.jnt_stiffness[j] != 0.0) or np.any(model.jnt_stiffnesspoly[j] != 0.0):
-            raise InputError(f"{path}: joint {name} has a spring; remove it and add the effect {name}/spring instead")
-    if np.any(model.body_gravcomp != 0.0):
-        body = model.body(int(np.argmax(model.body_gravcomp != 0.0))).name
-        raise InputError(f"{path}: body {body} has gravity compensation, which is not supported; remove it")
 
 
 def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree:
@@ -219,8 +121,8 @@ def _tree(mujoco: Any, model: Any, locked: dict[str, float], path: Path) -> Tree
 
 def _speeds(path: Path) -> dict[str, float]:
     """Largest speeds of the joints in a URDF, which MuJoCo does not keep; an MJCF has none."""
-    root = ElementTree.parse(path).getroot()
-    limits = {joint.get("name", ""): joint.find("limit") for joint in root.iter("joint")} if root.tag == "robot" else {}
+    root = urdf_root(path)
+    limits = {} if root is None else {joint.get("name", ""): joint.find("limit") for joint in root.iter("joint")}
     stated = {name: limit.get("velocity") for name, limit in limits.items() if limit is not None}
     return {name: float(speed) for name, speed in stated.items() if speed is not None and float(speed) > 0.0}
 

@@ -39,8 +39,8 @@ def plant_from_mapping(data: Mapping[str, object], where: str, folder: Path) -> 
         model = data.get("model")
         if not isinstance(model, str) or not model:
             raise InputError(f"{where}: model is {model!r}, expected the path of an MJCF or URDF file")
-        tree = read_tree(folder / model, _locked(data.get("locked"), where))
-        own = {joint: drive for joint, drive in read_drives(folder / model).items() if joint in tree.joints}
+        locked = _locked(data.get("locked"), where)
+        tree, own = read_tree(folder / model, locked), read_drives(folder / model, locked)
     drives = data.get("drives") or {}
     if not isinstance(drives, Mapping):
         raise InputError(f"{where}: drives is {drives!r}, expected joints with their drives")

@@ -50,8 +50,7 @@ class NewRobot:
             raise InputError(f"{folder / ROBOT_FILE} is there already; give another path, or task.overwrite=true")
         with StageProgress("new") as progress:
             progress("model file", 0.0)
-            tree = read_tree(model, self.locked)
-            in_file = {joint: drive for joint, drive in read_drives(model).items() if joint in tree.joints}
+            tree, in_file = read_tree(model, self.locked), read_drives(model, self.locked)
             progress("logs", 0.05)
             logs = [read_log(path) for path in self._logs()]
             progress("which column is which joint", 0.1)
