@@ -214,11 +214,14 @@ def test_what_an_actuator_adds_to_its_joint_stays(owners: Path):
 
 
 def test_joints_that_are_locked_at_zero_leave_the_file(owners: Path):
+    arm = owners / "arm.xml"
+    held = '<equality><joint joint1="elbow"/></equality></mujoco>'
+    arm.write_text(arm.read_text(encoding="utf-8").replace("</mujoco>", held), encoding="utf-8")
     (owners / "robot.yaml").write_text("plant: robot\nmodel: arm.xml\nlocked: {elbow: 0.0}\n", encoding="utf-8")
     model = read_robot(owners / "robot.yaml").model.with_effects({"shoulder/viscous": {"sigma": 0.1}})
     file = export_mjcf(model)
-    assert (file.source, file.note) == (owners / "arm.xml", "")
-    assert (file.model.njnt, file.model.nu, file.model.nkey) == (1, 1, 1)
+    assert (file.source, file.note) == (arm, "")
+    assert (file.model.njnt, file.model.nu, file.model.nkey, file.model.neq) == (1, 1, 1, 0)
     assert file.model.key_qpos.tolist() == [[0.1]]
     ours, theirs = motions(model, np.array([0.4, 0.0]))
     np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=1e-3)

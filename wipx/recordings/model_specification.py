@@ -82,7 +82,7 @@ def _specification(mujoco: Any, path: Path) -> Any:
 def _in_words(error: Exception, spec: Any = None) -> str:
     """What MuJoCo says of a file, in one line."""
     text = str(error).strip() or type(error).__name__
-    element = re.search(r"Element name '([^']*)'", text)
+    element = re.search(r"Element name '([^']+)'", text)
     body = f"body {element.group(1)}" if element else "a body"
     line = re.search(r"Line number=(\d+)", text)
     if line is not None:
