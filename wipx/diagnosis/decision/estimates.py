@@ -11,7 +11,7 @@ from wipx.core.results import NINETY_FIVE, Estimate
 from wipx.diagnosis.candidates.screening import Candidate
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.nonsmooth_search import alike
-from wipx.diagnosis.likelihood.sandwich import covariance
+from wipx.diagnosis.likelihood.sandwich import deviations_of_few
 from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
@@ -63,7 +63,7 @@ def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
         return np.zeros(0)
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * fitter.rules.answer.law_misfit * _explained(fit, nominal))
-    chance = wider * np.sqrt(np.diag(covariance(fit)))
+    chance = wider * deviations_of_few(fit)
     doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
     return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
 
