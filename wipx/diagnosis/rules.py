@@ -46,16 +46,19 @@ class EvidenceRules:
         promising: Share of the best expected gain.
         worthless: Expected gain [nats].
         unproven: Number of effects.
+        unsteady: Share of a size.
     """
 
     promising: float
     worthless: float
     unproven: int
+    unsteady: float
 
 
 PROMISING = "share of the best expected gain below which an effect is not fitted"
 WORTHLESS = "expected gain below which an effect is not fitted"
 UNPROVEN = "effects that need not transfer to held-out recordings, at most"
+UNSTEADY = "usual standard deviation of a size from run to run; widens intervals"
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class InnovationRules(EvidenceRules):
     promising: float = rule(0.05, "", PROMISING, DEVELOPING, 0.0)
     worthless: float = rule(3.0, "nats", WORTHLESS, "derived: less than the penalty of one number", 0.0)
     unproven: int = rule(4, "effects", UNPROVEN, f"{REAL}: small effects fill up what stays unexplained", 99)
+    unsteady: float = rule(0.0, "of the size", UNSTEADY, "derived: where laws hold, sizes stay", 0.0)
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,13 @@ class ForecastRules(EvidenceRules):
     promising: float = rule(0.0, "", PROMISING, "every effect is fitted", 0.0)
     worthless: float = rule(-UNLIMITED, "nats", WORTHLESS, "every effect is fitted", -UNLIMITED)
     unproven: int = rule(0, "effects", UNPROVEN, f"{REAL}: no effect is taken on trust where no law holds", 99)
+    unsteady: float = rule(
+        0.1,
+        "of the size",
+        UNSTEADY,
+        "from the literature: load and temperature change friction by tens of per cent (Bittencourt, Gunnarsson 2012)",
+        0.0,
+    )
     level: float = rule(
         0.1,
         "probability",

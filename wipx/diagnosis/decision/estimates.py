@@ -1,5 +1,6 @@
 """Numbers of a diagnosis: estimates with 95 % intervals, and bounds of what was not found."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -24,8 +25,7 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     values = space.to_values(cube)
     moving = scatter_of(fit, fitter.runs, fitter.rules.answer.moves)
-    between = np.array([moving[i].deviation if i in moving else 0.0 for i in range(len(cube))])
-    deviation = np.hypot(deviations(fitter, fit, nominal), between)
+    deviation = np.hypot(deviations(fitter, fit, nominal), _between_runs(fitter, fit, moving))
     as_good = alike(fitter, fit, _explained(fit, nominal))
     low = space.to_values(np.maximum(np.minimum(cube - NINETY_FIVE * deviation, as_good.min(axis=0)), 0.0))
     high = space.to_values(np.minimum(np.maximum(cube + NINETY_FIVE * deviation, as_good.max(axis=0)), 1.0))
@@ -46,6 +46,26 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
         for i, p in enumerate(space.free)
         for turns in [_whole_turns(p.name, float(values[i]))]
     )
+
+
+def _between_runs(fitter: Fitter, fit: Fit, moving: Mapping[int, Scatter]) -> np.ndarray:
+    """Standard deviations of sizes from run to run in the cube, shape (D,).
+
+    What runs show, or what is usual where no law holds exactly: the less, the more runs do not show it.
+    """
+    space, cube = fit.hypothesis.space, fit.hypothesis.cube
+    sizes = np.array([_is_size(p.name, space.model) for p in space.free])
+    values, neutral = space.to_values(cube), space.to_values(space.neutral)
+    less = values - fitter.own_rules.unsteady * (values - neutral)
+    usual = np.where(sizes, np.abs(space.to_cube(less) - cube), 0.0)
+    shown = np.array([moving[i].deviation if i in moving else 0.0 for i in range(len(cube))])
+    return np.maximum(shown, usual / np.sqrt(fitter.runs.max() + 1))
+
+
+def _is_size(name: str, model: Model) -> bool:
+    """Whether a number "site/kind.symbol" is one to which an effect is proportional."""
+    effect, _, symbol = name.rpartition(".")
+    return bool(effect) and symbol in effect_of(effect, model.plant).linear_in
 
 
 def _ends(space: ParameterSpace, cube: np.ndarray, index: int, moving: Scatter) -> tuple[float, float]:

@@ -269,7 +269,22 @@ class RobotSearch(Search):
         if not effects:
             return self.nominal
         fit = self._first_fit(effects, expected)
-        return fit if self.criteria.gains_enough(self.nominal, fit) else self.nominal
+        return self._rather_loose(fit) if self.criteria.gains_enough(self.nominal, fit) else self.nominal
+
+    def _rather_loose(self, fit: Fit) -> Fit:
+        """A fit of what recorded forces ask for, or that of one loose drive, which explains more than all of it.
+
+        Where a drive is loose, the forces ask for several laws that imitate it.
+        """
+        several = [part for part in parts_of(self.plant) if len(_effects_at(fit, part)) > 1]
+        loose = [
+            name
+            for name, effect in vocabulary(self.plant).items()
+            if effect.scan in LOOSE_DRIVES and any(_site(name) in part for part in several)
+        ]
+        found = self.store.side_by_side(lambda name: self.store.extended_by(self.nominal, name), loose)
+        alone = max(filter(None, found), key=lambda each: score(each, self.nominal), default=fit)
+        return alone if score(alone, self.nominal) > score(fit, self.nominal) else fit
 
     def fit_from(self, other: Fit) -> Fit:
         """The fit of what another kind of evidence has found, as far as this one looks for it."""
