@@ -274,9 +274,10 @@ class RobotSearch(Search):
     def _rather_loose(self, fit: Fit) -> Fit:
         """A fit of what recorded forces ask for, or that of one loose drive, which explains more than all of it.
 
-        Where a drive is loose, the forces ask for several laws that imitate it.
+        Where a drive is loose, the forces ask for several laws that imitate it, beside usual friction.
         """
-        several = [part for part in parts_of(self.plant) if len(_effects_at(fit, part)) > 1]
+        unusual = [effect for effect in fit.effects if not kind_of(effect).usual]
+        several = [part for part in parts_of(self.plant) if sum(_site(effect) in part for effect in unusual) > 1]
         loose = [
             name
             for name, effect in vocabulary(self.plant).items()
