@@ -63,9 +63,9 @@ def _between_runs(fitter: Fitter, fit: Fit, moving: Mapping[int, Scatter]) -> np
 
 
 def _is_size(name: str, model: Model) -> bool:
-    """Whether a number "site/kind.symbol" is one to which an effect is proportional."""
+    """Whether a number is one "site/kind.symbol" to which an effect is proportional."""
     effect, _, symbol = name.rpartition(".")
-    return bool(effect) and symbol in effect_of(effect, model.plant).linear_in
+    return name not in model.plant.parameters and symbol in effect_of(effect, model.plant).linear_in
 
 
 def _ends(space: ParameterSpace, cube: np.ndarray, index: int, moving: Scatter) -> tuple[float, float]:
