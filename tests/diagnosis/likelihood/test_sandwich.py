@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from wipx.core.results import NINETY_FIVE
-from wipx.diagnosis.likelihood.sandwich import covariance, deviations_of_few
+from wipx.diagnosis.likelihood.sandwich import covariance, robust_deviations
 
 DRAWS, ROWS, NUMBERS = 300, 8, 4  # rows of each stretch
 
@@ -30,18 +30,18 @@ def test_intervals_cover_with_few_stretches(stretches: int, fresh_seed: int):
     covered = 0
     for _ in range(DRAWS):
         fit, found = _straight_fit(stretches, 0.5, rng)
-        covered += np.sum(np.abs(found) < NINETY_FIVE * deviations_of_few(fit))
+        covered += np.sum(np.abs(found) < NINETY_FIVE * robust_deviations(fit))
     assert 0.91 < covered / (DRAWS * NUMBERS) < 0.985
 
 
 def test_independent_errors_of_many_stretches_widen_little(fresh_seed: int):
     fit, _ = _straight_fit(60, 0.0, np.random.default_rng(fresh_seed))
     plain = np.sqrt(np.diag(np.linalg.inv(fit.information)))
-    wider = deviations_of_few(fit) / plain
+    wider = robust_deviations(fit) / plain
     assert np.all(wider >= 1.0)
     assert np.median(wider) < 1.3
 
 
 def test_few_stretches_widen_more_than_the_plain_sandwich(fresh_seed: int):
     fit, _ = _straight_fit(6, 0.5, np.random.default_rng(fresh_seed))
-    assert np.median(deviations_of_few(fit) / np.sqrt(np.diag(covariance(fit)))) > 1.0
+    assert np.median(robust_deviations(fit) / np.sqrt(np.diag(covariance(fit)))) > 1.0

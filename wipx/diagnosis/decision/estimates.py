@@ -12,7 +12,7 @@ from wipx.core.results import NINETY_FIVE, Estimate
 from wipx.diagnosis.candidates.screening import Candidate
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter
 from wipx.diagnosis.likelihood.nonsmooth_search import alike
-from wipx.diagnosis.likelihood.sandwich import deviations_of_few
+from wipx.diagnosis.likelihood.sandwich import robust_deviations
 from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
@@ -51,7 +51,7 @@ def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
 def _between_runs(fitter: Fitter, fit: Fit, moving: Mapping[int, Scatter]) -> np.ndarray:
     """Standard deviations of sizes from run to run in the cube, shape (D,).
 
-    What runs show, or what is usual where no law holds exactly: the less, the more runs do not show it.
+    The larger of what runs show and what is usual where no law holds exactly, divided by the root of their number.
     """
     space, cube = fit.hypothesis.space, fit.hypothesis.cube
     sizes = np.array([_is_size(p.name, space.model) for p in space.free])
@@ -83,7 +83,7 @@ def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
         return np.zeros(0)
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * fitter.rules.answer.law_misfit * _explained(fit, nominal))
-    chance = wider * deviations_of_few(fit)
+    chance = wider * robust_deviations(fit)
     doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
     return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
 

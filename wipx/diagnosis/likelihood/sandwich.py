@@ -35,12 +35,12 @@ def covariance(fit: Fit) -> np.ndarray:
     return found
 
 
-def deviations_of_few(fit: Fit) -> np.ndarray:
+def robust_deviations(fit: Fit) -> np.ndarray:
     """Half widths of 95 % intervals in the cube over those of a normal variable, shape (D,); at least the plain ones.
 
-    Few stretches show too little scatter, because the fit follows them, and show it badly. What the fit took from each
-    stretch is given back, and Student's t has as many degrees of freedom as the stretches leave each number (CR2 with
-    Satterthwaite's approximation: Bell, McCaffrey 2002; Pustejovsky, Tipton 2018).
+    The fit follows few stretches too closely, and their scatter is known poorly. So scores are corrected for the share
+    that the fit has taken from a stretch, and Student's t has as many degrees of freedom as the stretches leave each
+    number (CR2 with Satterthwaite's approximation: Bell, McCaffrey 2002; Pustejovsky, Tipton 2018).
     """
     plain = np.linalg.pinv(fit.information)
     sizes, axes = np.linalg.eigh(plain)

@@ -272,7 +272,7 @@ class RobotSearch(Search):
         return self._rather_loose(fit) if self.criteria.gains_enough(self.nominal, fit) else self.nominal
 
     def _rather_loose(self, fit: Fit) -> Fit:
-        """A fit of what recorded forces ask for, or that of one loose drive, which explains more than all of it.
+        """The fit of what recorded forces ask for, or that of one loose drive alone if it explains more.
 
         Where a drive is loose, the forces ask for several laws that imitate it, beside usual friction.
         """
