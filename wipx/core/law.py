@@ -4,14 +4,19 @@ The exponential and the sine are polynomials, because calls into the mathematics
 a loop over rollouts from being vectorised (five times slower, measured by `make bench`).
 """
 
+from typing import Any
+
 import numba
 import numpy as np
 
 # NaN and infinity stay meaningful: a rollout that fell over must be recognisable.
-law = numba.njit(fastmath={"nsz", "arcp", "contract", "afn", "reassoc"}, error_model="numpy", nogil=True)
-inlined = numba.njit(
-    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"}, inline="always"
-)  # keeps constants constant
+FAST: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}, "error_model": "numpy"}
+
+# Every function that a kernel calls is taken into it. Otherwise a kernel that has just been compiled would call another
+# copy of the function than one that is read from the disk, and the two round differently.
+TAKEN_IN: dict[str, Any] = {**FAST, "forceinline": True, "no_cfunc_wrapper": True}
+law = numba.njit(**TAKEN_IN)  # by the compiler
+inlined = numba.njit(**FAST, inline="always")  # as source: loops over arrays compile three times faster so
 
 
 @law

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.identify.linearisation import Linearisation, transition_over
 from wipx.sim.cache import cached
 
@@ -179,7 +180,7 @@ def _filter(moves, t, last, sensor, rate, late, jolts, gains, covariance, innova
                 p[:joints, :joints] += jolts[k, r]
 
 
-@cached
+@inlined
 def _show(p, sensor, late, shown, innovation):
     """Covariance of the state with what the sensors show, (n, joints), and that of what they show."""
     joints = len(late)
@@ -192,7 +193,7 @@ def _show(p, sensor, late, shown, innovation):
         innovation[i, i] += sensor[i]
 
 
-@cached
+@inlined
 def _invert(a):
     """Invert a positive definite matrix in place, by Gauss and Jordan without pivots."""
     n = len(a)
@@ -209,7 +210,7 @@ def _invert(a):
                     a[i, j] -= weight * a[k, j]
 
 
-@cached
+@inlined
 def _correct(p, shown, inverse, gain):
     """Gain of a row, and the covariance (n, n) after it."""
     joints = len(inverse)
@@ -226,7 +227,7 @@ def _correct(p, shown, inverse, gain):
             p[i, j] = p[j, i] = total
 
 
-@cached
+@inlined
 def _predict(p, move, work):
     """Covariance (n, n) after a move, which leaves the accelerations, the last third of the state, as they are."""
     n = len(p)
@@ -246,7 +247,7 @@ def _predict(p, move, work):
     p[moved:, moved:] = work[moved:, moved:]
 
 
-@cached
+@inlined
 def _wander(p, rate, dt):
     """Add to a covariance what accelerations that wander do to the state within an interval."""
     joints = len(rate)
@@ -288,7 +289,7 @@ def _smooth(along, closed, told, rows, recordings, until, prior, surprises, foun
         _add_product(along.covariance[k, r], now, found[w])
 
 
-@cached
+@inlined
 def _add_product(columns, of, to):
     """Add the product of a matrix, given by its columns, with some columns to `to`, as many rows as that has."""
     rows, models = to.shape

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.core.model import Model, ModelBatch
 from wipx.sim.analytic import AnalyticSimulator
-from wipx.sim.cache import cached
 from wipx.sim.inputs import Inputs
 
 STEP = 1e-5  # [s] of the simulated steps from which accelerations are read off
@@ -114,7 +114,7 @@ def _accelerations(model: Model, commands: np.ndarray, states: np.ndarray) -> np
     return ((run.rates[1] - run.rates[0]) / STEP).reshape(joints, -1)
 
 
-@cached
+@inlined
 def transition_over(a, dt, transition, pushed):
     """exp(A dt), written to `transition`, and what accelerations of one, held over dt, do to the state, to `pushed`.
 
@@ -137,7 +137,7 @@ def transition_over(a, dt, transition, pushed):
         transition[:] = transition @ transition
 
 
-@cached
+@inlined
 def _short_transition(a, dt, transition, pushed):
     """The same to third order."""
     joints, n = a.shape

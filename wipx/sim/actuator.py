@@ -5,7 +5,7 @@ backlash or elasticity. A drive that reports its force knows it up to the lag; w
 is a loop over the lanes of a block and is skipped where it is absent (see `wipx.sim.kernel`).
 """
 
-from wipx.core.law import clip, inlined, law, sign, sin_cos
+from wipx.core.law import clip, law, sign, sin_cos
 from wipx.effects import backlash as backlash_law
 from wipx.effects import dead_zone, saturation, speed_limit
 from wipx.effects.trees import elasticity
@@ -72,7 +72,7 @@ def servo(S, J, n):
         J[R.DRIVE * W + w] = force if due else J[R.SERVO_FORCE * W + w]
 
 
-@inlined
+@law
 def actuator_path(S, J, n, on, has, j):
     """From the command of a joint to the force on it."""
     if has[j, R.ON_SERVO]:

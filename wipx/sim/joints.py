@@ -3,7 +3,7 @@
 Dry friction is a level here; `wipx.sim.sticking` finds what it does to the rates of all joints.
 """
 
-from wipx.core.law import clip, inlined, law, maximum
+from wipx.core.law import clip, law, maximum
 from wipx.effects import lagged_stribeck, load_friction, quadratic_drag, sticky_spot, stribeck
 from wipx.effects.hysteresis import yielding
 from wipx.effects.presliding import bristle, bristle_rate
@@ -13,7 +13,7 @@ from wipx.sim.actuator import sprung
 from wipx.sim.rows import W
 
 
-@inlined
+@law
 def levels(J, n, has, j):
     """Dry friction of a joint: the impulse may lie anywhere up to these levels."""
     if has[j, R.ON_STRIBECK]:
@@ -38,7 +38,7 @@ def levels(J, n, has, j):
             J[R.MINUS * W + w] += more
 
 
-@inlined
+@law
 def smooth_friction(S, B, J, n, has, j):
     """Friction of a joint that is a force: drag, bristle, the paper's lagged law."""
     if has[j, R.ON_DRAG]:
@@ -126,7 +126,7 @@ def remainder(S, B, J, n):
             J[R.FORCE * W + w] += force * ((1.0 - share) + share * command)
 
 
-@inlined
+@law
 def drifted(J, n):
     """Coordinate and rate of a joint in mid-step, as far as they are known before the forces, and its command."""
     for w in range(n):
@@ -136,7 +136,7 @@ def drifted(J, n):
         J[R.RATE * W + w] = J[R.V * W + w] + half * J[R.ACCELERATION * W + w]
 
 
-@inlined
+@law
 def arrived(J, n, has, j):
     """Drift the second half with the rate of the step's end, and carry on what depends on the motion."""
     for w in range(n):
@@ -156,7 +156,7 @@ def arrived(J, n, has, j):
             J[R.Z * W + w] = J[R.BRISTLE_KEPT * W + w] * z + J[R.BRISTLE_GAIN * W + w] * mean
 
 
-@inlined
+@law
 def remembered(J, n, has, j):
     """Note that a joint has begun to move, and what its drive needs of this step in the next one."""
     for w in range(n):

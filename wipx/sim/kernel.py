@@ -14,7 +14,7 @@ mean rate, Coriolis terms use a predicted rate of mid-step.
 
 import numpy as np
 
-from wipx.core.law import inlined, law, relaxing
+from wipx.core.law import law, relaxing
 from wipx.sim import rows as R
 from wipx.sim.actuator import actuator_path, delayed_command, taken_back
 from wipx.sim.body import double_body, wip_body
@@ -31,7 +31,7 @@ def filled(count):
     return -(-count // TOGETHER) * TOGETHER
 
 
-@inlined
+@law
 def respond(A, S, B, n, on, has, rigid):
     """Friction, and the motion under all forces; the rigid body's mass matrix and forces are known."""
     for j in range(len(has)):
@@ -49,7 +49,7 @@ def respond(A, S, B, n, on, has, rigid):
             S[R.TIME * W + w] += S[R.STEP * W + w]
 
 
-@inlined
+@law
 def step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
     """Advance every lane of the block by its step; a lane whose step is zero keeps its state to the bit.
 
@@ -80,7 +80,7 @@ def step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid):
     respond(A, S, B, n, on, has, rigid)
 
 
-@inlined
+@law
 def loaded(J, n, on, has, j):
     """Begin the sums of forces, damping and levels of dry friction on a joint."""
     for w in range(n):

@@ -12,7 +12,7 @@ From some round on only the first such joint of a lane moves, which ends for cer
 scheme for solving the complementarity problem, Opsearch 11).
 """
 
-from wipx.core.law import clip, inlined, law, maximum
+from wipx.core.law import clip, law, maximum
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
@@ -26,7 +26,7 @@ def row_of(i, j):
     return R.COMMON + i * (i + 1) // 2 + j
 
 
-@inlined
+@law
 def one_joint(S, B, n, on):
     """The closed form for one joint."""
     J = B[0]
@@ -41,7 +41,7 @@ def one_joint(S, B, n, on):
             J[R.NEXT * W + w] = b + inverse * p
 
 
-@inlined
+@law
 def two_joints(A, n, on):
     """The closed form for two joints."""
     second, whole = R.BLOCK, 2 * R.BLOCK  # rows of the second joint, and of the whole robot
@@ -178,7 +178,7 @@ def inverse_mass(S, B, n, on, joints, j, rigid):
             J[R.NEXT * W + w] = J[R.AIM * W + w]
 
 
-@inlined
+@law
 def rates_at_the_end(A, S, B, n, on, has, rigid):
     """Solve for the rates at the end of the step, and for the inverse mass of joints that ask for it."""
     joints = len(has)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.core.model import Model
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
@@ -127,7 +128,7 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
     return out
 
 
-@cached
+@inlined
 def _add_product(total, weights, states):
     """Add the product of two matrices; the second has many columns."""
     for i in range(len(total)):

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.core.model import Model, ModelBatch
 from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
@@ -170,7 +171,7 @@ def _report_errors(reported, delivered, counted, last, first, out):
                     errors[k] = min(max(10.0 * errors[k] / size, -LARGEST), LARGEST) if finite else LARGEST
 
 
-@cached
+@inlined
 def _report_weights(reported, forces, counted, size):
     """Zero and weights of one drive's report, and whether the modelled force is finite."""
     normal, right = ALIKE * size * size * np.eye(1 + TAPS), np.zeros(1 + TAPS)

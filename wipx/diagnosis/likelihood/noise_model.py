@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.sim.cache import cached
 
@@ -170,7 +171,7 @@ def _add_surprises(z, surprises, lags, first, last, out):
                     out[row, column] += _dot(surprises[c, k - 1 - i : last - i], surprises[d, k - 1 - j :])
 
 
-@cached
+@inlined
 def _dot(x, y):
     """Sum of products of two series, over the rows of the first."""
     total = 0.0
@@ -204,7 +205,7 @@ def _whitened(innovations, counted, lags, surprises, weights, whitening):
     return out
 
 
-@cached
+@inlined
 def _subtract_past(series, known, lags, weights):
     """Take from a series what the lags of another foretell, which begins lags[-1] rows earlier."""
     for i in range(0, len(lags), 2):  # two at a time: half as often through the series
@@ -213,7 +214,7 @@ def _subtract_past(series, known, lags, weights):
             series[k] -= weights[i] * near[k] + weights[i + 1] * far[k]
 
 
-@cached
+@inlined
 def _subtract_surprises(series, surprises, first, weights):
     """Take from a series, which begins at row `first`, what the commands' surprises foretell."""
     inputs = len(surprises)
@@ -223,7 +224,7 @@ def _subtract_surprises(series, surprises, first, weights):
             _subtract(series[begin - first :], surprises[d, begin - 1 - i :], weights[i * inputs + d])
 
 
-@cached
+@inlined
 def _subtract(series, other, weight):
     """Take from a series the weighted other one."""
     for k in range(len(series)):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wipx.core.law import inlined
 from wipx.diagnosis.likelihood.recording_batch import SETTLES, RecordingBatch
 from wipx.identify.linearisation import Linearisation, transition_over
 from wipx.sim.cache import cached
@@ -87,7 +88,7 @@ def observer_gains(
     return tuple(Gains(*each) for each in zip(gains, whitening, strict=True))
 
 
-@cached
+@inlined
 def _correct(covariance, i, j, late, noise, half, root):
     """The covariance after a sensor of variance `noise` has shown state i, less `late` times state j.
 
@@ -108,7 +109,7 @@ def _correct(covariance, i, j, late, noise, half, root):
                 covariance[a, b, w] -= half[a, w] * half[b, w]
 
 
-@cached
+@inlined
 def _whiten(c, i, j, late, half, root, whitening):
     """Row c of the inverse Cholesky factor of the innovations' covariance: what earlier channels foretell is taken."""
     lanes = root.shape[1]
@@ -120,7 +121,7 @@ def _whiten(c, i, j, late, half, root, whitening):
     whitening[c, c] = root[c]
 
 
-@cached
+@inlined
 def _predict(covariance, transition, half):
     """The covariance one interval later, but for the forces."""
     n, _, lanes = covariance.shape
@@ -134,7 +135,7 @@ def _predict(covariance, transition, half):
                 covariance[b, a, w] = covariance[a, b, w]
 
 
-@cached
+@inlined
 def _multiply_add(total, left, right, lanes):
     """Write the sum over an even number of products, two at a time: half as often through the lanes."""
     for w in range(lanes):
@@ -144,7 +145,7 @@ def _multiply_add(total, left, right, lanes):
             total[w] += left[q, w] * right[q, w] + left[q + 1, w] * right[q + 1, w]
 
 
-@cached
+@inlined
 def _shake(covariance, drive, jolts, dt):
     """What white forces, held over the interval, add to the covariance, and unseen moves of the coordinates."""
     joints, _, lanes = drive.shape
@@ -157,7 +158,7 @@ def _shake(covariance, drive, jolts, dt):
                 covariance[joints + i, joints + j, w] += drive[i, j, w] * dt[w]
 
 
-@cached
+@inlined
 def _combine(half, whitening, gain):
     """Gain by which each channel's error moves the states, shape (n, m, lanes): that of all channels at once."""
     m, n, lanes = half.shape
@@ -169,7 +170,7 @@ def _combine(half, whitening, gain):
                     gain[q, d, w] += half[c, q, w] * whitening[c, d, w]
 
 
-@cached
+@inlined
 def _move(a, b, place, interval, force, recording, recordings, own, pushed, transition, drive, dt):
     """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
     joints, n = b.shape[1], len(own)
@@ -187,7 +188,7 @@ def _move(a, b, place, interval, force, recording, recordings, own, pushed, tran
                     drive[i, j, w] += b[place, i, q] * b[place, j, q] * force[level, q]
 
 
-@cached
+@inlined
 def _begin(covariance, sensor, time, k):
     """At the first row the state is hardly known; once it has settled, as well as the sensors tell.
 
@@ -206,7 +207,7 @@ def _begin(covariance, sensor, time, k):
                     covariance[joints + j, joints + j, level * recordings + r] = known / 0.02**2
 
 
-@cached
+@inlined
 def _hear(sensor, time, delay, noise):
     """Variance of a sensor's noise: a late one shows at first what was before the recording, at unknown speeds."""
     for level in range(len(sensor)):
@@ -214,7 +215,7 @@ def _hear(sensor, time, delay, noise):
             noise[level * len(time) + r] = sensor[level] + (BEFORE * max(delay - time[r], 0.0)) ** 2
 
 
-@cached
+@inlined
 def _store(gain, inverse, channels, exists, gains, whitening):
     """Write gains (L, R, n, channels) and whitening (L, R, m, m) of one row, where a recording has it."""
     levels, recordings, n, _ = gains.shape
