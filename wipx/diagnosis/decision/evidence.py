@@ -64,7 +64,8 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
     """What is missing of a robot of many joints.
 
     Its joints do not all lack the same: exact laws hold on some joint beside the first effects. If they hold on none,
-    forecasts come first, and innovations are searched only if laws hold on some joint beside what forecasts find.
+    forecasts come first, and innovations are searched only if laws hold on some joint beside what forecasts find, from
+    there on.
     """
     if context.by_forecasts_alone:
         chosen = Chosen(search.nominal)
@@ -73,8 +74,10 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
     begun = search.grown(steps=1)
     if not context.holds_somewhere(begun.fit):
         ahead = _by_forecasts_and_forces(context, begun.fit, watcher, afresh=True)
-        if ahead is not None and not context.holds_somewhere(search.fit_from(ahead.rest.fit)):
-            return ahead
+        if ahead is not None:
+            begun = Chosen(search.fit_from(ahead.rest.fit), begun.considered)
+            if not context.holds_somewhere(begun.fit):
+                return ahead
     chosen = search.run(begun.fit).after(begun.considered)
     holds = context.is_quiet(chosen.fit) and context.holds_somewhere(chosen.fit)
     ahead = None if holds else _by_forecasts_and_forces(context, chosen.fit, watcher)

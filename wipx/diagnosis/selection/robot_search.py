@@ -288,9 +288,8 @@ class RobotSearch(Search):
         return alone if score(alone, self.nominal) > score(fit, self.nominal) else fit
 
     def fit_from(self, other: Fit) -> Fit:
-        """The fit of what another kind of evidence has found, as far as this one looks for it."""
-        fitter, plant = self.store.fitter, self.plant
-        effects = tuple(name for name in other.effects if fitter.looks_for(name, effect_of(name, plant)))
+        """The fit of the effects of the vocabulary that another kind of evidence has found."""
+        effects = tuple(name for name in other.effects if not effect_of(name, self.plant).is_outside(self.plant))
         return self._first_fit(effects, other.hypothesis.values) if effects else self.nominal
 
     def _first_fit(self, effects: tuple[str, ...], values: Mapping[str, float]) -> Fit:
