@@ -1,6 +1,9 @@
 """Every effect has words that a person understands."""
 
+from pathlib import Path
+
 import pytest
+from diagnosis.recorded_arm import arm
 
 from wipx.core.plant import PLANTS
 from wipx.effects.catalogue import vocabulary
@@ -22,6 +25,15 @@ def test_several_effects_are_joined_by_and():
 def test_effects_of_a_plant_have_words_of_their_own(plant):
     words = [effect_in_words(name, plant.kind) for name in vocabulary(plant)]
     assert len(set(words)) == len(words)
+
+
+def test_effects_of_a_robot_from_a_file_say_at_which_joint_they_are(tmp_path: Path):
+    names = vocabulary(arm(tmp_path).plant)
+    words = [effect_in_words(name, "robot") for name in names]
+    assert len(set(words)) == len(words)
+    for joint in ("shoulder", "elbow"):
+        own = [effect_in_words(name, "robot") for name in names if joint in name.partition("/")[0]]
+        assert all(joint in words for words in own)
 
 
 @pytest.mark.parametrize("plant", PLANTS.values(), ids=list(PLANTS))

@@ -14,7 +14,7 @@ def _steady(rate, p, body):
 
 EFFECT = Effect(
     kind="back_emf",
-    words="back-EMF of the motor",
+    words="back-EMF of {place}",
     sites=("actuator", "drive"),
     parameters=(
         Parameter("k_e", "force lost per speed, k_t^2/R at the joint", "damping", 0.0, 0.0, 3.0, 0.02, grid=(0.02,)),

@@ -16,7 +16,7 @@ from wipx.effects.lag import rate_of
 
 EFFECT = Effect(
     kind="backlash",
-    words="backlash of the drive",
+    words="backlash of {place}",
     sites=("actuator", "drive"),
     parameters=(
         Parameter(

@@ -12,7 +12,7 @@ def _steady(place, p, body):
 
 EFFECT = Effect(
     kind="ripple",
-    words="torque ripple (cogging) of the motor",
+    words="torque ripple (cogging) of {place}",
     sites=("actuator", "drive"),
     parameters=(
         Parameter("A", "amplitude", "force", 0.0, 0.0, 0.5, 0.02),

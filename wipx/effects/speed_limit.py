@@ -13,7 +13,7 @@ def _is_out_of_reach(fitted: FittedEffect) -> bool:
 
 EFFECT = Effect(
     kind="speed_limit",
-    words="torque-speed limit of the motor",
+    words="torque-speed limit of {place}",
     sites=("actuator", "drive"),
     parameters=(
         Parameter(

@@ -16,7 +16,7 @@ def _is_the_whole_way(fitted: FittedEffect) -> bool:
 
 EFFECT = Effect(
     kind="sticky_spot",
-    words="sticky spot on the rail",
+    words="sticky spot on {place}",
     sites=("translation", "joint"),
     parameters=(
         Parameter("F_c", "extra level", "force", 0.0, 0.0, 1.0, 0.05),

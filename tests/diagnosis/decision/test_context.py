@@ -1,10 +1,12 @@
 """Which models are trusted."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from diagnosis.recorded import SIMULATOR, Bench, bench, coloured, thinned
+from diagnosis.recorded_arm import arm, recorded
 from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
@@ -13,6 +15,8 @@ from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.rules import USUAL
 from wipx.sim.inputs import Inputs
+
+SPRING = "actuator_elbow/elasticity"
 
 
 def test_a_model_that_predicts_far_worse_than_the_nominal_one_is_not_trusted(fresh_seed: int):
@@ -54,6 +58,18 @@ def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed:
     assert context.errors(fit).times_the_floor > USUAL.trust.near_floor
     assert context.unruly_joints(fit) == ()
     assert context.is_trusted(fit)
+
+
+@pytest.mark.parametrize(("loud", "quiet"), [("elbow", True), ("shoulder", False)])
+def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(loud: str, quiet: bool, tmp_path: Path, fresh_seed: int):
+    spring = {"drive_inertia": 0.004, "stiffness": 9.0, "damping": 0.015}
+    model = arm(tmp_path)
+    case = Bench(model, (recorded(model.with_effects({SPRING: spring}), fresh_seed),), {})
+    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    right = Hypothesis.of(case.setting, (SPRING,), {f"{SPRING}.{name}": value for name, value in spring.items()})
+    force = case.quiet.force * np.where(np.array(model.plant.joints) == loud, 100.0, 1.0)
+    fit = context.fitter.fit(right, replace(case.quiet, force=force), steps=0)
+    assert context.is_quiet(fit) is quiet
 
 
 @pytest.mark.parametrize("every", [1, 2])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis.recorded import Bench, bench
+from diagnosis.recorded import Bench, bench, forecasts
 from diagnosis.recorded_arm import arm, recorded
 from sim.random_trees import mjcf
 
@@ -134,3 +134,16 @@ def _fitted(case: Bench, nominal: Fit, effects: tuple[str, ...], values: dict[st
     """The fit of some effects from some values of them on, with the noise of the nominal model at first."""
     start = {f"{name}.{symbol}": value for name, own in values.items() for symbol, value in own.items()}
     return case.fitter.first_fit(Hypothesis.of(case.setting, effects, start), nominal.levels)
+
+
+def test_forecasts_go_on_from_all_that_innovations_found(fresh_seed: int, tmp_path: Path):
+    """Also from one law in the place of two, of which forecasts would name the two."""
+    model, law = arm(tmp_path), "elbow/asymmetric_coulomb"
+    levels = {"F_plus": 0.05, "F_minus": 0.02}
+    case = Bench(model, (recorded(model.with_effects({law: levels}), fresh_seed),), {})
+    begin = {f"{law}.{symbol}": value for symbol, value in levels.items()}
+    by_row = case.fitter.fit(Hypothesis.of(case.setting, (law,), begin), case.quiet)
+    ahead = forecasts(case)
+    nominal = ahead.first_fit(Hypothesis.of(case.setting, (), {}))
+    search = RobotSearch.of(FitStore.of(ahead, case.setting, nominal), nominal)
+    assert search.fit_from(by_row).effects == (law,)

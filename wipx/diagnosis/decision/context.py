@@ -16,10 +16,13 @@ from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import Rules
 from wipx.diagnosis.selection.search import Search
+from wipx.effects.catalogue import kind_of
 from wipx.identify.evaluation import RIGHT, Judge
 from wipx.identify.noise import low_passed, sensor_noise
 from wipx.identify.resolution import resolving
 from wipx.sim.analytic import AnalyticSimulator
+
+SWINGING = "springs"  # `Effect.scan` of drives that swing on a spring
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Context:
         model = InnovationsModel.of(self.by_row.simulator, data, self.setting.nominal)
         shaken = replace(self.by_row.innovations_model, jolts=model.jolts, _known={})
         fitter = replace(self.by_row, innovations_model=shaken)
-        again = fitter.converged(fitter.fit(held.hypothesis, held.levels))
+        again = fitter.first_fit(held.hypothesis, held.levels)
         if again.log_likelihood - held.log_likelihood <= self.rules.selection.least_gain:
             return self
         fitter = replace(self.by_row, innovations_model=model)
@@ -109,9 +112,16 @@ class Context:
         return all(others[name] <= self.rules.trust.distrusted * error for name, error in errors.completed.items())
 
     def is_quiet(self, fit: Fit) -> bool:
-        """Whether a fit asks for no forces but those of its laws, row by row."""
+        """Whether a fit asks for no forces but those of its laws, row by row.
+
+        A drive that swings on its spring is not asked: no sensor shows it, so that the observer cannot correct where it
+        is, and takes what that does for noise of the force on its joint.
+        """
+        plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
-        return not by_row.asks_for_force(seen.levels, self.setting.scales).any()
+        swinging = {plant.joint_at(name.partition("/")[0]) for name in fit.effects if kind_of(name).scan == SWINGING}
+        asked = np.array([joint not in swinging for joint in plant.joints])
+        return not np.any(asked & by_row.asks_for_force(seen.levels, self.setting.scales))
 
     def holds_somewhere(self, fit: Fit) -> bool:
         """Whether the laws of a fit leave some joint no error that lasts."""

@@ -185,7 +185,8 @@ class InnovationFitter(Fitter):
 
     def first_fit(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
         """From noise levels of another fit on."""
-        return self.converged(self.fit(hypothesis, self.spread_for(hypothesis.model, levels)))
+        fit = self.fit(hypothesis, self.spread_for(hypothesis.model, levels))
+        return self.converged(self.refit(fit, self.levels_of(fit, afresh=True)))
 
     def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
@@ -198,16 +199,18 @@ class InnovationFitter(Fitter):
                 break
         return fit
 
-    def levels_of(self, fit: Fit, steps: Sequence[float] = LEVEL_STEPS) -> NoiseLevels:
+    def levels_of(self, fit: Fit, steps: Sequence[float] = LEVEL_STEPS, *, afresh: bool = False) -> NoiseLevels:
         """Noise levels that make the recordings likeliest, by a pattern search on their logarithms.
 
         Groups of channels are searched side by side: what a level does to the likelihood of another group is left
-        aside in a step, but the step must make all of them likelier together. Where none of the longest steps does, the
-        levels are changed one by one. A common factor of a group's levels does not matter: the first sensor's is kept.
+        aside in a step, but the step must make all of them likelier together. A common factor of a group's levels does
+        not matter: the first sensor's is kept.
 
         Args:
             fit: Where to start.
             steps: Of the logarithms, the longest first.
+            afresh: Whether the levels may be far off. Then they are also changed one by one where none of the longest
+                steps gains.
         """
         levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
@@ -226,7 +229,7 @@ class InnovationFitter(Fitter):
                 gains = likelihoods[1:] - likelihoods[0]
                 move = _joined(gains, moves, free)
                 there = search.likelier([_best_of_each(gains, trials, best, free)], best)
-                if there is None and len(free) > 1 and step == max(LEVEL_STEPS):
+                if there is None and afresh and len(free) > 1 and step == steps[0]:
                     there = search.changed_alone(best, np.concatenate(free), step, centre)
                 if there is None:
                     break
