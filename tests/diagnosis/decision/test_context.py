@@ -72,19 +72,36 @@ def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(loud: str, quiet: 
     assert context.is_quiet(fit) is quiet
 
 
+def shaken_pendulums(rng: np.random.Generator, unknown: tuple[float, ...]) -> list[Recording]:
+    """Runs of a double pendulum under white commands, and under as white torques of some sizes that no log has."""
+    t, nominal, hanging = np.arange(0.0, 8.0, 0.004), nominal_model("double_pendulum"), np.array([np.pi, 0.0, 0.0, 0.0])
+    recordings = []
+    for number, size in enumerate(unknown):
+        u = 0.2 * np.sin(2.0 * np.pi * np.outer(t, rng.uniform(0.5, 1.5, 2))) + rng.normal(0.0, 0.3, (len(t), 2))
+        inputs = Inputs.of([t], [u + rng.normal(0.0, 1.0, (len(t), 2)) * size], [0])
+        run = SIMULATOR.replay(ModelBatch(nominal), inputs, hanging[:, None, None])
+        q = run.coordinates[:, :, 0, 0] + rng.normal(0.0, 1e-6, (len(t), 2))
+        columns = {"t": t, "theta1": q[:, 0], "theta2": q[:, 1], "u1": u[:, 0], "u2": u[:, 1]}
+        recordings.append(Recording(f"r{number}.csv", columns))
+    return recordings
+
+
+def reads_means(recordings: list[Recording]) -> bool:
+    """Whether the rows of some logs are taken for means of commands."""
+    case = Bench(nominal_model("double_pendulum"), tuple(recordings), {})
+    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    return context.reading_means(case.fit()).data.has_means
+
+
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_log_that_is_slower_than_the_controller_is_recognised(every: int, fresh_seed: int):
     """Single commands of one joint shake the other joint too, which noise of the sensors does not."""
-    rng = np.random.default_rng(fresh_seed)
-    t, nominal, hanging = np.arange(0.0, 8.0, 0.004), nominal_model("double_pendulum"), np.array([np.pi, 0.0, 0.0, 0.0])
-    logged = []
-    for number in range(3):
-        u = 0.2 * np.sin(2.0 * np.pi * np.outer(t, rng.uniform(0.5, 1.5, 2))) + rng.normal(0.0, 0.3, (len(t), 2))
-        run = SIMULATOR.replay(ModelBatch(nominal), Inputs.of([t], [u], [0]), hanging[:, None, None])
-        q = run.coordinates[:, :, 0, 0] + rng.normal(0.0, 1e-6, (len(t), 2))
-        columns = {"t": t, "theta1": q[:, 0], "theta2": q[:, 1], "u1": u[:, 0], "u2": u[:, 1]}
-        slower = thinned(Recording(f"r{number}.csv", columns), np.arange(0, len(t), every))
-        logged.append(replace(slower, periods=1))
-    case = Bench(nominal, tuple(logged), {})
-    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
-    assert context.reading_means(case.fit()).data.has_means == (every > 1)
+    logged = shaken_pendulums(np.random.default_rng(fresh_seed), (0.0, 0.0, 0.0))
+    slower = [replace(thinned(one, np.arange(0, len(one), every)), periods=1) for one in logged]
+    assert reads_means(slower) == (every > 1)
+
+
+@pytest.mark.parametrize("seed", [0, 7, None])  # of the first two, all recordings together are likelier as slow logs
+def test_what_shakes_one_recording_only_is_no_slow_log(seed: int | None, fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed if seed is None else seed)
+    assert not reads_means(shaken_pendulums(rng, (0.3, 0.0, 0.0, 0.0, 0.0)))

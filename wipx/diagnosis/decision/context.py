@@ -62,9 +62,10 @@ class Context:
         return cls(fitter, fitter, setting, levels, Judge(engine, noise, HORIZON), recordings)
 
     def reading_means(self, held: Fit) -> "Context":
-        """The same with rows that have means of commands, if the recordings are far likelier so; else itself.
+        """The same with rows that have means of commands, if every recording is likelier so; else itself.
 
-        If the log is slower than the controller, single commands shake the joints within a row, several at once.
+        If the log is slower than the controller, single commands shake the joints within a row, several at once. That
+        shows in every recording; what a model lacks looks like it in some.
 
         Args:
             held: A fit by innovations, of commands that were held over each row.
@@ -75,7 +76,8 @@ class Context:
         shaken = replace(self.by_row.innovations_model, jolts=model.jolts, _known={})
         fitter = replace(self.by_row, innovations_model=shaken)
         again = fitter.first_fit(held.hypothesis, held.levels)
-        if again.log_likelihood - held.log_likelihood <= self.rules.selection.least_gain:
+        gains = fitter.by_recording(again, again.white) - self.by_row.by_recording(held, held.white)
+        if gains.min() <= 0.0 or gains.sum() <= self.rules.selection.least_gain:
             return self
         fitter = replace(self.by_row, innovations_model=model)
         return replace(self, fitter=fitter, by_row=fitter, recordings=recordings)
