@@ -184,15 +184,19 @@ class InnovationFitter(Fitter):
         return whitened(errors, noise, self.data)
 
     def first_fit(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
-        """From noise levels of another fit on."""
+        """From noise levels of another fit on, which may be far off."""
         fit = self.fit(hypothesis, self.spread_for(hypothesis.model, levels))
-        return self.converged(self.refit(fit, self.levels_of(fit, afresh=True)))
+        return self._alternated(fit, afresh=True)
 
     def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
+        return self._alternated(fit, rounds)
+
+    def _alternated(self, fit: Fit, rounds: int = 4, *, afresh: bool = False) -> Fit:
         for k in range(rounds):
             before = fit.log_likelihood
-            fit = self.refit(fit, self.levels_of(fit, LEVEL_STEPS if k == 0 else LEVEL_STEPS[-1:]))
+            steps = LEVEL_STEPS if k == 0 else LEVEL_STEPS[-1:]
+            fit = self.refit(fit, self.levels_of(fit, steps, afresh=afresh and k == 0))
             if fit.log_likelihood - before < CONVERGED or k == rounds - 1:
                 fit = self._with_best_spread(fit)
             if fit.log_likelihood - before < CONVERGED:
