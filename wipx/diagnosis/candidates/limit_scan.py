@@ -1,7 +1,9 @@
 """How much a drive gives at most: first guesses for saturation and for a torque-speed limit.
 
 What a limit takes away is no more proportional to it than where it sets in. The linear response to the force that is
-missing under each of many limits is enough to compare them all; the screening then simulates the best ones.
+missing under each of many limits is enough to compare them all; the screening then simulates the best ones. A joint
+that sticks moves less than the linear response says. So the limits whose response goes best with what is left, whatever
+its size, are simulated too.
 """
 
 import numpy as np
@@ -13,6 +15,7 @@ from wipx.diagnosis.likelihood.force_response import FAST, drive_force, motion_o
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 
 GUESSES = 6
+BY_COURSE = 3  # more, by the course of the response
 TOGETHER = 24  # limits whose responses are kept at once; bounds the memory
 LIMITS = np.geomspace(0.05, 1.5, 36)  # of the largest command
 SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of the largest speed
@@ -20,7 +23,7 @@ SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speed
 
 
 def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
-    """Likely largest forces [N or N m], best first, shape (up to GUESSES, 1).
+    """Likely largest forces [N or N m], best first, shape (up to GUESSES + BY_COURSE, 1).
 
     Args:
         fitter: Of the fit.
@@ -32,7 +35,7 @@ def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: s
 
 
 def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
-    """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES, 2).
+    """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES + BY_COURSE, 2).
 
     Args:
         fitter: Of the fit.
@@ -55,7 +58,7 @@ def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, 
     fastest = max(1e-9, *(float(np.quantile(np.abs(rate[data.counted]), FAST)) for rate in rates))
     pairs = np.array([(limit * largest, speed * fastest) for speed in speeds for limit in LIMITS])
     left = left_of(fit, basis)
-    gains = np.zeros(len(pairs))
+    slopes, sizes = np.zeros(len(pairs)), np.zeros(len(pairs))
     for begin in range(0, len(pairs), TOGETHER):
         part = pairs[begin : begin + TOGETHER, :, None, None].swapaxes(0, 1)
         change = sum(
@@ -63,14 +66,16 @@ def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, 
             for joint, force, rate in zip(joints, forces, rates, strict=True)
         )
         change = change - basis @ (basis.T @ change)
-        gains[begin : begin + TOGETHER] = -(left @ change) - 0.5 * np.sum(change**2, axis=0)
+        slopes[begin : begin + TOGETHER], sizes[begin : begin + TOGETHER] = left @ change, np.sum(change**2, axis=0)
+    whole = -slopes - 0.5 * sizes
+    course = 0.5 * np.minimum(slopes, 0.0) ** 2 / np.maximum(sizes, 1e-300) - fitter.rules.selection.least_gain
     stall, free = pairs.T
 
     def same(i: int) -> np.ndarray:
         ratio = np.maximum(stall, stall[i]) / np.minimum(stall, stall[i])
         return (ratio <= SAME_LIMIT) & (free == free[i])
 
-    return pairs[peaks(gains, GUESSES, same)]
+    return pairs[list(dict.fromkeys([*peaks(whole, GUESSES, same), *peaks(course, BY_COURSE, same)]))]
 
 
 def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.ndarray) -> np.ndarray:
