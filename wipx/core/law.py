@@ -10,13 +10,13 @@ import numba
 import numpy as np
 
 # NaN and infinity stay meaningful: a rollout that fell over must be recognisable.
-FAST: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}, "error_model": "numpy"}
+OPTIONS: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reassoc"}, "error_model": "numpy"}
 
 # Every function that a kernel calls is taken into it. Otherwise a kernel that has just been compiled would call another
 # copy of the function than one that is read from the disk, and the two round differently.
-TAKEN_IN: dict[str, Any] = {**FAST, "forceinline": True, "no_cfunc_wrapper": True}
+TAKEN_IN: dict[str, Any] = {**OPTIONS, "forceinline": True, "no_cfunc_wrapper": True}
 law = numba.njit(**TAKEN_IN)  # by the compiler
-inlined = numba.njit(**FAST, inline="always")  # as source: loops over arrays compile three times faster so
+inlined = numba.njit(**OPTIONS, inline="always")  # as source: loops over arrays compile three times faster so
 
 
 @law

@@ -17,7 +17,7 @@ from typing import Any
 import numba
 from numba.core import config as numba_settings
 
-from wipx.core.law import FAST
+from wipx.core.law import OPTIONS
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
@@ -86,7 +86,7 @@ def _keep_on_disk() -> None:
 def cached(function):
     """Compile a kernel, kept on disk for the next run. What it calls is a `law` or `inlined` (`wipx.core.law`)."""
     _keep_on_disk()
-    return numba.njit(**FAST, nogil=True, cache=True, boundscheck=False)(function)
+    return numba.njit(**OPTIONS, nogil=True, cache=True, boundscheck=False)(function)
 
 
 def part(function):
@@ -97,6 +97,6 @@ def part(function):
     """
     _keep_on_disk()
     rows, blocks, flags = numba.types.float64[::1], numba.types.float64[:, ::1], numba.types.boolean[::1]
-    return numba.cfunc(numba.types.void(rows, blocks, numba.types.int64, flags, numba.types.int64), cache=True, **FAST)(
-        function
-    )
+    return numba.cfunc(
+        numba.types.void(rows, blocks, numba.types.int64, flags, numba.types.int64), cache=True, **OPTIONS
+    )(function)

@@ -24,7 +24,7 @@ def test_a_saturation_is_found_where_it_is(share: float, gain: float, fresh_seed
 
 @pytest.mark.parametrize("answer", [1.0, 0.3])
 def test_a_torque_speed_line_is_found_where_it_is(answer: float, fresh_seed: int):
-    """Also where the joint answers to forces less than a free one, because it sticks most of the time."""
+    """Also where the linear response is three times as large as what is left."""
     usual = bench("linear_axis", {}, fresh_seed).recordings[0]
     truth = {
         "F_stall": 0.7 * float(np.abs(usual["u"]).max()),

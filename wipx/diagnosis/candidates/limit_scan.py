@@ -1,9 +1,9 @@
 """How much a drive gives at most: first guesses for saturation and for a torque-speed limit.
 
 What a limit takes away is no more proportional to it than where it sets in. The linear response to the force that is
-missing under each of many limits is enough to compare them all; the screening then simulates the best ones. A joint
-that sticks moves less than the linear response says. So the limits whose response goes best with what is left, whatever
-its size, are simulated too.
+missing under each of many limits is enough to compare them all; the screening then simulates the best ones. Beside dry
+friction the linear response is only roughly right, and its whole size may cost more than it explains. So the limits
+whose response goes best with what is left, whatever its size, are simulated too.
 """
 
 import numpy as np

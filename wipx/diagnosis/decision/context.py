@@ -116,8 +116,8 @@ class Context:
     def is_quiet(self, fit: Fit) -> bool:
         """Whether a fit asks for no forces but those of its laws, row by row.
 
-        A drive that swings on its spring is not asked: no sensor shows it, so that the observer cannot correct where it
-        is, and takes what that does for noise of the force on its joint.
+        A joint whose drive swings on a spring does not count: no sensor shows where such a drive is, so that the
+        observer takes its errors for forces on the joint.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
