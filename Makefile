@@ -19,7 +19,8 @@ $(READY): requirements.lock pyproject.toml
 		{ echo "setup: $(PYTHON) is missing or older than 3.11; give a newer one with PYTHON=python3.12" >&2; exit 1; }
 	@test -x $(PY) || $(PYTHON) -m venv .venv
 	$(PY) -m pip install --quiet --requirement requirements.lock
-	$(PY) -m pip install --quiet torch==2.13.0 lightning==2.6.6 pytorch-lightning==2.6.6 lightning-utilities==0.15.3 torchmetrics==1.9.0
+	@$(PY) -m wipx.compilation & compilation=$$!; \
+	$(PY) -m pip install --quiet torch==2.13.0 lightning==2.6.6 pytorch-lightning==2.6.6 lightning-utilities==0.15.3 torchmetrics==1.9.0 && wait $$compilation
 	$(PY) -m pip install --quiet --no-deps --editable .
 	@touch $@
 

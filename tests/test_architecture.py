@@ -12,7 +12,7 @@ LAYERS = (
     {"control", "identify", "recordings", "report", "tracking"},
     {"export", "hardware", "learn"},
     {"baselines", "diagnosis", "importing"},
-    {"library"},
+    {"compilation", "library"},
     {"tasks"},
     {"proof"},
     {"config", "renamed"},

@@ -19,6 +19,7 @@ def step(x):
 def shown(x):
     return drawn(x)
 """,
+    "a/filter.py": "from wipx.b.sizes import SPEED\n\n@cached_for(SPEED)\ndef follow(x):\n    return x\n",
     "b/law.py": "@law\ndef force(x):\n    return 2.0 * x\n",
     "b/rows.py": "PLACE = 3\n",
     "b/sizes.py": "from wipx.b.units import METRE\nSPEED = 4.0 * METRE\n",

@@ -13,7 +13,7 @@ import numpy as np
 
 from wipx.core.law import inlined
 from wipx.identify.linearisation import Linearisation, transition_over
-from wipx.sim.cache import cached
+from wipx.sim.cache import cached_for, floats, integers, tuples
 
 FIRST_SPAN = 0.05  # [s] of rows from which the first rates are read
 
@@ -141,7 +141,7 @@ def gains_along(
     return Gains(moves, gains, covariance, innovation)
 
 
-@cached
+@cached_for(floats(3), integers(2), floats(2), integers(1))
 def _moves(a, place, t, last):
     """Transitions to every row from the one before, shape (K + 1, R, n, n)."""
     joints, size = a.shape[1:]
@@ -158,7 +158,9 @@ def _moves(a, place, t, last):
     return found
 
 
-@cached
+@cached_for(
+    floats(4), floats(2), integers(1), floats(1), floats(1), floats(1), floats(4), floats(4), floats(4), floats(4)
+)
 def _filter(moves, t, last, sensor, rate, late, jolts, gains, covariance, innovation):
     """Gains, covariances after each row, and inverse covariances of the innovations, of every recording."""
     joints, n = len(late), moves.shape[2]
@@ -264,7 +266,17 @@ def _wander(p, rate, dt):
         p[m, m] += rate[j] * dt
 
 
-@cached
+@cached_for(
+    tuples(Gains, floats(4)),
+    floats(4),
+    floats(4),
+    integers(1),
+    integers(1),
+    integers(1),
+    floats(4),
+    floats(4),
+    floats(3),
+)
 def _smooth(along, closed, told, rows, recordings, until, prior, surprises, found):
     """States at some rows from those before their correction, the innovations there, and those of later rows.
 

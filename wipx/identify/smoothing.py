@@ -96,7 +96,7 @@ class Smoother:
         for r, last in enumerate(self._inputs.last):
             here, t = recordings == r, self._inputs.t[: last + 1, r]
             until[here] = np.searchsorted(t, t[starts[here]] + LOOK_AHEAD + 1e-6, side="right") - 1
-        return Places(rows, recordings, until)
+        return Places(np.ascontiguousarray(rows), np.ascontiguousarray(recordings), until)
 
     def following(
         self,

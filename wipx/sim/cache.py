@@ -21,12 +21,13 @@ from wipx.core.law import OPTIONS
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
-COMPILED = ("cached", "law", "inlined", "part")  # decorators
+COMPILED = ("cached", "cached_for", "law", "inlined", "part")  # decorators
+AHEAD: list[tuple[Any, tuple[Any, ...]]] = []  # kernels that take long to compile, each with the types of its arguments
 
 
 def sources_digest(package: Path) -> str:
     """Digest of the sources of a package's compiled functions, and of the modules that these take names from."""
-    marks = [f"@{name}\n" for name in COMPILED]
+    marks = [f"@{name}{end}" for name in COMPILED for end in "\n("]
     todo = [path for path in package.rglob("*.py") if UNSEEN not in path.parts]
     todo = [path for path in todo if any(mark in path.read_text(encoding="utf-8") for mark in marks)]
     found: set[Path] = set()
@@ -59,9 +60,10 @@ def _taken_from(source: Path, package: Path) -> Iterator[Path]:
 
 
 def _is_compiled(node: ast.stmt) -> bool:
-    return isinstance(node, ast.FunctionDef) and any(
-        isinstance(decorator, ast.Name) and decorator.id in COMPILED for decorator in node.decorator_list
-    )
+    if not isinstance(node, ast.FunctionDef):
+        return False
+    used = [one.func if isinstance(one, ast.Call) else one for one in node.decorator_list]
+    return any(isinstance(one, ast.Name) and one.id in COMPILED for one in used)
 
 
 @cache
@@ -87,6 +89,42 @@ def cached(function):
     """Compile a kernel, kept on disk for the next run. What it calls is a `law` or `inlined` (`wipx.core.law`)."""
     _keep_on_disk()
     return numba.njit(**OPTIONS, nogil=True, cache=True, boundscheck=False)(function)
+
+
+def cached_for(*types):
+    """Compile as `cached` does, and ahead for arguments of these types (`wipx.compilation`): kernels that take long."""
+
+    def decorate(function):
+        kernel = cached(function)
+        AHEAD.append((kernel, types))
+        return kernel
+
+    return decorate
+
+
+def is_kept(kernel: Any) -> bool:
+    """Whether machine code of a kernel is on the disk."""
+    return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
+
+
+def floats(dimensions: int) -> Any:
+    """The type of a contiguous array of real numbers."""
+    return numba.types.Array(numba.float64, dimensions, "C")
+
+
+def integers(dimensions: int) -> Any:
+    """The type of a contiguous array of whole numbers."""
+    return numba.types.Array(numba.int64, dimensions, "C")
+
+
+def booleans(dimensions: int) -> Any:
+    """The type of a contiguous array of truth values."""
+    return numba.types.Array(numba.boolean, dimensions, "C")
+
+
+def tuples(fields: type, item: Any) -> Any:
+    """The type of a named tuple whose fields all have one type."""
+    return numba.types.NamedUniTuple(item, len(fields._fields), fields)
 
 
 def part(function):

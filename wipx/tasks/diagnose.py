@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wipx.compilation import compile_filters_meanwhile
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
@@ -56,6 +57,7 @@ class Diagnose:
             feedback_of(description),
             description.limits,
         )
+        compile_filters_meanwhile()
         with StageProgress("diagnose") as progress:
             diagnosis = diagnose(
                 recordings,

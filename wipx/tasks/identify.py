@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wipx.compilation import compile_filters_meanwhile
 from wipx.core.errors import check_positive
 from wipx.core.model import Model
 from wipx.core.plant import Plant
@@ -53,6 +54,7 @@ class Identify:
         request = self._request(job, robot)
         objective: Objective = job.part("objective")
         optimizer = job.part("optimizer")
+        compile_filters_meanwhile()
         with SearchProgress() as progress:
             found = identify(
                 request,

@@ -5,6 +5,7 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
+from wipx.compilation import compile_filters_meanwhile
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
@@ -39,6 +40,7 @@ class Predict:
                 f"{job.model_path}: a model of plant {model.plant.kind}, "
                 f"expected {nominal.plant.kind} as in {source.name}"
             )
+        compile_filters_meanwhile()
         errors, traces = self.compared(nominal, model, source.load(), job.part("sim"))
         columns = model.plant.coordinates
         with written_together(job.out) as folder:

@@ -1,11 +1,13 @@
 """What is named of the effects that forecasts find, and what the completed model has beside them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
 
+import wipx
 from wipx.diagnosis.decision.completion import completed, dominant, transferring
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
@@ -15,9 +17,12 @@ from wipx.diagnosis.pipeline import KnownRobot, diagnose
 from wipx.diagnosis.rules import USUAL
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.search import Search, named_effects
+from wipx.proof.blind_robots.dirty import draw_dirty
+from wipx.proof.blind_robots.write import case_files
 
 FRICTION = {"translation/coulomb": {"F_c": 1.0}}
 SAG = {"actuator/sag": {"d": 0.01, "l": 0.4, "t_0": 2.0, "u_0": 4.0}}
+DIRT_ONLY = 159204493570571078722387199942759287503  # a pendulum with an eccentric encoder, and forces from outside
 
 
 def search_of(case: Bench) -> Search:
@@ -105,3 +110,12 @@ def test_what_every_machine_has_is_in_the_model_but_not_named(fresh_seed: int):
     minor = {effect.name for effect in answer.minor}
     assert minor <= set(answer.model.effects)
     assert all(answer.held_out.completed[name] < answer.held_out.nominal[name] for name in ("x",))
+
+
+@pytest.mark.slow
+def test_a_simple_law_that_is_left_of_a_rich_one_is_named_only_if_it_removes_enough(tmp_path: Path):
+    drawn = draw_dirty(np.random.default_rng(DIRT_ONLY), "dirt_only", (4.0, 6.0))
+    for name, text in case_files(drawn).visible.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    answer = wipx.diagnose(tmp_path)
+    assert not answer.effects  # beside the eccentricity, a peak of friction is no better than a little of it, or none

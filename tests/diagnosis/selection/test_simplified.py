@@ -31,4 +31,4 @@ def test_forecasts_end_with_the_simple_law_unless_something_speaks_for_the_rich_
     search = Search.of(FitStore.of(fitter, case.setting, nominal), nominal)
     start = {f"{name}.{symbol}": value for name, own in hidden.items() for symbol, value in own.items()}
     fit = search.store.keep(fitter.first_fit(Hypothesis.of(case.setting, (rich,), start)))
-    assert search.simplified(fit, fit.effects).fit.effects == (left,)
+    assert search.simplified(fit).fit.effects == (left,)

@@ -178,21 +178,20 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit, *, afre
 def _with_minor_effects(end: Found) -> Found:
     """What forecasts found, with what every machine has a little of, and with small effects told.
 
-    Small are those that remove little beside what no law describes. They stay in the completed model, unless no other
-    is there.
+    Rich laws give way to simple ones first, which may be small. Small are those that remove little beside what no law
+    describes. They stay in the completed model, unless no other is there.
     """
     search, further = _completed_and_grown(end.search, end.rest.fit)
     further = _without_harm(end.context, search, further)
-    whole = further.fit
+    simple = _by_part(search, further.fit, lambda part, own: part.simplified(own))
+    whole = _joined(search, further.fit, [chosen.fit for chosen in simple])
     kept = _by_part(search, whole, dominant)
-    considered = end.rest.considered + further.considered + tuple(each for chosen in kept for each in chosen.considered)
+    looked_at = (chosen.considered for chosen in (further, *simple, *kept))
+    considered = end.rest.considered + tuple(each for history in looked_at for each in history)
     named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
     if not named and end.rest.fit.effects:
         search, whole = _completed(end.search, end.search.nominal)
     small = {effect for effect in whole.effects if effect not in named}
-    simple = _by_part(search, whole, lambda part, own: part.simplified(own, named))
-    whole = _joined(search, whole, [chosen.fit for chosen in simple])
-    considered += tuple(each for chosen in simple for each in chosen.considered)
     minor = tuple(effect for effect in whole.effects if effect in small)
     context = replace(end.context, setting=search.store.setting)
     if whole is end.rest.fit:

@@ -14,7 +14,7 @@ from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.noise_model import whitened_change
 from wipx.identify.linearisation import transition_over
-from wipx.sim.cache import cached
+from wipx.sim.cache import cached_for, floats, integers
 
 SLOW = 0.02  # of the largest speed, at which half of dry friction has built up
 FAST = 0.995  # quantile of the speed that counts as the largest
@@ -97,7 +97,7 @@ def response(fitter: InnovationFitter, fit: Fit, joint: int, forces: np.ndarray)
     return whitened_change(innovations, fit.noise, data).reshape(len(forces), -1).T
 
 
-@cached
+@cached_for(floats(3), floats(2), integers(2), floats(2), integers(1), integers(1), floats(4), floats(4), floats(3))
 def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
     """White innovations (K + 1, m, R, C) that forces (R, K + 1, C) cause; all columns of a row lie side by side."""
     recordings, rows, columns = forces.shape

@@ -11,7 +11,7 @@ import numpy as np
 
 from wipx.core.law import inlined
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
-from wipx.sim.cache import cached
+from wipx.sim.cache import booleans, cached, cached_for, floats, integers
 
 SURPRISES = 2  # rows before the present whose commands may know of its noise
 LARGEST = 1e3  # standard deviations up to which an innovation is counted
@@ -180,7 +180,7 @@ def _dot(x, y):
     return total
 
 
-@cached
+@cached_for(floats(4), booleans(2), integers(1), floats(3), floats(2), floats(2))
 def _whitened(innovations, counted, lags, surprises, weights, whitening):
     models, recordings, m, rows = innovations.shape
     out = np.zeros((models, recordings, m, rows))

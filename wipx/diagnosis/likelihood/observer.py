@@ -14,7 +14,7 @@ import numpy as np
 from wipx.core.law import inlined
 from wipx.diagnosis.likelihood.recording_batch import SETTLES, RecordingBatch
 from wipx.identify.linearisation import Linearisation, transition_over
-from wipx.sim.cache import cached
+from wipx.sim.cache import cached_for, floats, integers
 
 UNSETTLED = 100.0  # how much noisier forces count while the state is settling
 DIFFUSE = 1e4  # how much larger the variance of the first state is, which is read off noisy, perhaps late sensors
@@ -230,7 +230,21 @@ def _store(gain, inverse, channels, exists, gains, whitening):
                         whitening[level, r, c, d] = inverse[c, d, w]
 
 
-@cached
+@cached_for(
+    floats(3),
+    floats(3),
+    integers(2),
+    floats(2),
+    integers(1),
+    integers(1),
+    floats(2),
+    floats(2),
+    floats(1),
+    floats(2),
+    floats(4),
+    floats(5),
+    floats(5),
+)
 def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, jolts, gains, whitening):
     """Fill in gains (L, K + 1, R, n, channels) and whitening (L, K + 1, R, m, m) of L noise levels.
 

@@ -5,7 +5,7 @@ is explained already, so that what a law misses is not filled up with further ef
 and what it considered; fits are kept in a `FitStore`, and `Criteria` decide between them.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -169,18 +169,18 @@ class Search:
             best = found if score(found, base) > score(best, base) else best
         return best
 
-    def simplified(self, fit: Fit, effects: Collection[str]) -> Chosen:
-        """A fit in which some rich laws give way to the simple ones that they contain, where nothing tells them apart.
+    def simplified(self, fit: Fit) -> Chosen:
+        """A fit in which rich laws give way to the simple ones that they contain, where nothing tells them apart.
 
         What tells them apart while a search goes on may be gone beside the effects that it ends with.
         """
-        for effect in (name for name in fit.effects if name in effects):
+        for effect in named_effects(fit):
             reduced = self.store.with_reduced_law(fit, effect)
             plain = self.store.escaped(reduced) if reduced is not None else fit
             if plain is not fit and not self.criteria.tells_apart(fit, plain):
                 reason = "nothing tells it from the simple law that it contains"
                 considered = (ConsideredEffect(effect, evidence(plain, fit), False, reason),)
-                return self.simplified(plain, effects).after(considered)
+                return self.simplified(plain).after(considered)
         return Chosen(fit)
 
     def pruned(self, fit: Fit) -> Chosen:

@@ -1,0 +1,22 @@
+"""What is compiled ahead is what a diagnosis uses."""
+
+import pytest
+from diagnosis.recorded import Bench, nominal_model, recorded
+
+import wipx.compilation
+from wipx.sim.cache import AHEAD
+
+
+def test_filters_are_compiled_ahead_for_the_arrays_of_a_diagnosis(fresh_seed: int):
+    before = {kernel: set(kernel.signatures) for kernel, _ in AHEAD}
+    recordings = recorded("double_pendulum", {"joint1/coulomb": {"F_c": 0.2}}, seed=fresh_seed)
+    Bench(nominal_model("double_pendulum"), recordings, {}).diagnosed()
+    for kernel, types in AHEAD:
+        assert types in kernel.signatures, kernel
+        assert set(kernel.signatures) - before[kernel] <= {types}, kernel
+
+
+def test_nothing_is_said_where_all_is_compiled(capfd: pytest.CaptureFixture[str]):
+    wipx.compilation.compile_simulator()
+    wipx.compilation.compile_filters_meanwhile()
+    assert capfd.readouterr().err == ""
