@@ -5,9 +5,9 @@ All of it is a sum of columns: forces per unit of the inertial numbers of the li
 of each column.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from wipx.diagnosis.candidates.force_columns import (
 from wipx.diagnosis.candidates.point_mass_scan import masses_with
 from wipx.effects.catalogue import effect_of
 from wipx.sim.tree.equations import NUMBERS
-from wipx.sim.tree.inertias import inertial_numbers
+from wipx.sim.tree.inertias import body_numbers, body_of
 
 GAIN = 0.2  # usual error of a drive's gain or stiffness, or a sensor's scale
 LOST = 0.2  # usual share of a force that gears lose to friction; those of servos lose up to 0.4 (Duclusaud 2025)
@@ -294,57 +294,22 @@ def _interpolated(columns: np.ndarray, symbol: str, nodes: _Nodes, taken_from: n
     )
 
 
-@dataclass(frozen=True)
-class _LinkEffect:
-    """What an effect adds to a link's inertial numbers. Fitted are changes of its numbers from the neutral ones."""
-
-    model: Model
-    link: Link
-    kind: str
-
-    @property
-    def name(self) -> str:
-        return f"link_{self.link.body}/{self.kind}"
-
-    @cached_property
-    def neutral(self) -> dict[str, float]:
-        return effect_of(self.name, self.model.plant).neutral
-
-    def numbers(self, fitted: np.ndarray) -> dict[str, float]:
-        return dict(zip(self.neutral, (self._about + fitted).tolist(), strict=True))
-
-    def sizes(self, fitted: np.ndarray) -> np.ndarray:
-        return self._sizes_of_many(fitted[None])[:, 0]
-
-    def slopes(self, fitted: np.ndarray) -> np.ndarray:
-        step = SHIFT * np.eye(len(fitted))
-        return (self._sizes_of_many(fitted + step) - self._sizes_of_many(fitted - step)) / (2.0 * SHIFT)
-
-    def _sizes_of_many(self, fitted: np.ndarray) -> np.ndarray:
-        """For what is fitted (P, n), shape (10, P)."""
-        batch = ModelBatch(self._model, self._names, self._about + fitted)
-        return inertial_numbers(batch, self.link) - self._without
-
-    @cached_property
-    def _about(self) -> np.ndarray:
-        return np.array(list(self.neutral.values()))
-
-    @cached_property
-    def _names(self) -> tuple[str, ...]:
-        return tuple(f"{self.name}.{symbol}" for symbol in self.neutral)
-
-    @cached_property
-    def _model(self) -> Model:
-        return self.model.with_effects({self.name: self.neutral})
-
-    @cached_property
-    def _without(self) -> np.ndarray:
-        return inertial_numbers(ModelBatch(self.model), self.link)
-
-
 def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: float) -> dict[str, ForceLaw]:
-    """The laws of a link, whose columns begin at `first`, of a robot whose links are so long [m] and heavy [kg]."""
-    mass, place = model.parameters[f"{link.body}.mass"], np.full(3, longest)
+    """The laws of a link, whose columns begin at `first`, of a robot whose links are so long [m] and heavy [kg].
+
+    Fitted are changes of an effect's numbers from the neutral ones.
+    """
+    mass, com, scale = body_of(ModelBatch(model), link)
+    known, place = body_numbers(link, mass, com, scale), np.full(3, longest)
+
+    def moved(fitted: np.ndarray) -> np.ndarray:
+        return body_numbers(link, mass, com + fitted.T, scale) - known
+
+    def scaled(fitted: np.ndarray) -> np.ndarray:
+        return body_numbers(link, mass, com, scale * (1.0 + fitted[:, 0])) - known
+
+    def loaded(fitted: np.ndarray) -> np.ndarray:
+        return body_numbers(link, fitted[:, 0], fitted[:, 1:].T, np.zeros(1))
 
     def off_centre(sizes: np.ndarray) -> np.ndarray:
         return (link.body_rotation.T @ sizes[1:4] / mass)[None]
@@ -357,14 +322,37 @@ def _link_laws(model: Model, link: Link, first: int, longest: float, heaviest: f
         moment, heavy = sizes[1:4], masses_with(sizes[1:4], float(sizes[0]))[:, None]
         return np.column_stack([heavy, (moment / np.maximum(heavy, 1e-300) - link.body_place) @ link.body_rotation])
 
-    starts = {
-        "com_offset": (off_centre, np.full(3, -np.inf), MISPLACED * place),
-        "inertia": (unchanged, np.array([-0.9]), np.ones(1)),
-        "payload": (masses, np.array([0.0, *np.full(3, -np.inf)]), np.array([heaviest, *place])),
-    }
+    laws = (
+        ("com_offset", moved, off_centre, np.full(3, -np.inf), MISPLACED * place),
+        ("inertia", scaled, unchanged, np.array([-0.9]), np.ones(1)),
+        ("payload", loaded, masses, np.array([0.0, *np.full(3, -np.inf)]), np.array([heaviest, *place])),
+    )
     columns = np.arange(first, first + NUMBERS)
-    laws = {}
-    for kind, (begins, low, usual) in starts.items():
-        own = _LinkEffect(model, link, kind)
-        laws[own.name] = ForceLaw(columns, own.numbers, low, usual, sizes=own.sizes, slopes=own.slopes, starts=begins)
-    return laws
+    return {
+        f"link_{link.body}/{kind}": ForceLaw(
+            columns,
+            partial(_beside_neutral, effect_of(f"link_{link.body}/{kind}", model.plant).neutral),
+            low,
+            usual,
+            sizes=partial(_sizes, change),
+            slopes=partial(_slopes, change),
+            starts=starts,
+        )
+        for kind, change, starts, low, usual in laws
+    }
+
+
+def _beside_neutral(neutral: Mapping[str, float], fitted: np.ndarray) -> dict[str, float]:
+    return {symbol: value + change for (symbol, value), change in zip(neutral.items(), fitted.tolist(), strict=True)}
+
+
+def _sizes(change: Callable[[np.ndarray], np.ndarray], fitted: np.ndarray) -> np.ndarray:
+    """Sizes of columns, of a law that has them for many points (P, n) at once, shape (C, P)."""
+    return change(fitted[None])[:, 0]
+
+
+def _slopes(change: Callable[[np.ndarray], np.ndarray], fitted: np.ndarray) -> np.ndarray:
+    """Their slopes by central differences."""
+    step = SHIFT * np.eye(len(fitted))
+    up, down = np.split(change(np.concatenate([fitted + step, fitted - step])), 2, axis=1)
+    return (up - down) / (2.0 * SHIFT)

@@ -259,7 +259,7 @@ def _exchanged(regression: Regression, chosen: Fitted) -> Fitted:
 
 def _pruned(regression: Regression, chosen: Fitted) -> Fitted:
     """Without the effects that others make superfluous, the least worthy one first."""
-    numbers = chosen.numbers
-    fewer = [regression.fit({name: own for name, own in numbers.items() if name != gone}) for gone in numbers]
-    best = max(fewer, key=lambda fit: fit.score, default=chosen)
+    fewer = [{name: own for name, own in chosen.numbers.items() if name != gone} for gone in chosen.numbers]
+    hopeful = [start for start in fewer if not start or regression.at_most([*start])[1] >= chosen.score]
+    best = max(map(regression.fit, hopeful), key=lambda fit: fit.score, default=chosen)
     return _pruned(regression, best) if best.score >= chosen.score and best is not chosen else chosen

@@ -14,35 +14,51 @@ def inertial_numbers(batch: ModelBatch, link: Link) -> np.ndarray:
 
     Numbers of the body's own frame and effects at the link (payload, com_offset, inertia) are part of them.
     """
-    body = link.body
     if not link.mass:  # between two joints of one body
         return np.zeros((E.NUMBERS, batch.size))
-    mass = batch.column(f"{body}.mass")
+    numbers = body_numbers(link, *body_of(batch, link))
+    payload = f"link_{link.body}/payload"
+    if payload in batch.model.effects:
+        place = np.stack([batch.column(f"{payload}.{axis}") for axis in "xyz"])
+        numbers = numbers + body_numbers(link, batch.column(f"{payload}.mass"), place, np.zeros(1))
+    return numbers
+
+
+def body_of(batch: ModelBatch, link: Link) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The body of a link with a mass, without its payload, as `body_numbers` takes it."""
+    body, effects = link.body, batch.model.effects
     com = np.stack([batch.column(f"{body}.com_{axis}") for axis in "xyz"])
     scale = batch.column(f"{body}.inertia")
-    effects = batch.model.effects
     if f"link_{body}/com_offset" in effects:
         com = com + np.stack([batch.column(f"link_{body}/com_offset.{axis}") for axis in "xyz"])
     if f"link_{body}/inertia" in effects:
         scale = scale * batch.column(f"link_{body}/inertia.scale")
-    numbers = _numbers(mass, _placed(link, com), scale * link.inertia[..., None])
-    if f"link_{body}/payload" in effects:
-        place = np.stack([batch.column(f"link_{body}/payload.{axis}") for axis in "xyz"])
-        extra = batch.column(f"link_{body}/payload.mass")
-        numbers = numbers + _numbers(extra, _placed(link, place), np.zeros((3, 3, 1)))
-    return numbers
+    return batch.column(f"{body}.mass"), com, scale
 
 
-def _placed(link: Link, place: np.ndarray) -> np.ndarray:
-    """Points (3, P) of the body's frame in the link's."""
-    return link.body_rotation @ place + link.body_place[:, None]
+def body_numbers(link: Link, mass: np.ndarray, com: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """The ten numbers of a link with P bodies in turn, shape (10, P).
+
+    Args:
+        link: The link.
+        mass: Of the body, shape (P,) or (1,) [kg].
+        com: Its centre in the frame of the link's body, shape (3, P) or (3, 1) [m].
+        scale: Its inertia about the centre over that in the link's file, shape (P,) or (1,).
+    """
+    return _numbers(mass, link.body_rotation @ com + link.body_place[:, None], scale * link.inertia[..., None])
 
 
 def _numbers(mass: np.ndarray, com: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """Of masses (P,), centres (3, P) and inertias about them (3, 3, P)."""
-    about = inertia + mass * (np.sum(com**2, axis=0) * np.eye(3)[..., None] - com[:, None] * com[None])
-    entries = [about[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    return np.stack([mass, *(mass * com), *entries])
+    moment = mass * com
+    xx, yy, zz = moment * com
+    found = np.empty((E.NUMBERS, max(moment.shape[1], inertia.shape[2])))
+    found[0], found[1:4] = mass, moment
+    found[4], found[5], found[6] = inertia[0, 0] + yy + zz, inertia[1, 1] + xx + zz, inertia[2, 2] + xx + yy
+    found[7] = inertia[0, 1] - moment[0] * com[1]
+    found[8] = inertia[0, 2] - moment[0] * com[2]
+    found[9] = inertia[1, 2] - moment[1] * com[2]
+    return found
 
 
 def numbers_of(mass: float, com: np.ndarray, inertia: np.ndarray) -> np.ndarray:
