@@ -19,13 +19,14 @@ from wipx.sim.kernel import rollout
 
 BODY = {"body_mass": 1.0, "com_height": 0.5, "body_inertia": 0.1}
 FILTERS_ONLY = "--filters"
+_begun: "list[subprocess.Popen[bytes]]" = []  # processes that nobody waits for
 
 
 def compile_filters_meanwhile() -> None:
     """Say that code must be compiled, if that is so, and have the filters compiled in a process of its own."""
     if not is_kept(rollout):
         print("compiling the simulator and the filters, once; this takes up to a minute", file=sys.stderr)
-        _in_a_process_of_its_own()
+        _begun.append(_filters_in_a_process())
 
 
 def compile_filters() -> None:
@@ -47,7 +48,7 @@ def compile_simulator() -> None:
     AnalyticSimulator().replay(ModelBatch(model), Inputs.regular(0.01, 100.0, 1), np.zeros((2, 1, 1)))
 
 
-def _in_a_process_of_its_own() -> "subprocess.Popen[bytes]":
+def _filters_in_a_process() -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-m", "wipx.compilation", FILTERS_ONLY]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -61,7 +62,7 @@ def main() -> int:
     if FILTERS_ONLY in sys.argv:
         compile_filters()
         return 0
-    filters = _in_a_process_of_its_own()
+    filters = _filters_in_a_process()
     compile_simulator()
     return filters.wait()
 
