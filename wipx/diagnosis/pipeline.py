@@ -12,7 +12,7 @@ from wipx.core.limits import JointLimits
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.diagnosis.answer.answer import answered, proposed
-from wipx.diagnosis.answer.caveats import caveats
+from wipx.diagnosis.answer.caveats import caveats, implausible
 from wipx.diagnosis.answer.suspects import asked, check_suspects
 from wipx.diagnosis.candidates.torque_regression import numbers_by_forces
 from wipx.diagnosis.decision.context import Context
@@ -131,4 +131,5 @@ def diagnose(
     seconds = time.perf_counter() - begun
     guessed = context.data.has_means and not any(recording.periods > 1 for recording in recordings)
     notes = caveats(recordings, rules.answer, context.cut_off, guessed_means=guessed)
+    notes += implausible(answer.effects, robot.nominal.plant, rules.answer.implausible)
     return replace(answer, title=title, source=source, notes=notes, seconds=seconds)

@@ -322,6 +322,9 @@ class AnswerRules:
         0.0,
     )
     wide: float = rule(0.3, "relative half width", "interval of a weak number, at least", JUDGEMENT, UNLIMITED)
+    implausible: float = rule(
+        2.0, "times", "factor by which an owner's number is wrong, beyond which the answer warns", JUDGEMENT, UNLIMITED
+    )
     concentrated: float = rule(0.6, "of the mismatch", "share of an interval that is told", JUDGEMENT, 0.0)
     few_rows: float = rule(0.3, "of the rows", "rows of that interval, at most", JUDGEMENT, 1.0)
     gap: float = rule(

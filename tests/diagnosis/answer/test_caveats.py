@@ -1,9 +1,13 @@
 """What recordings lack is said before a reader relies on them."""
 
 import numpy as np
+import pytest
 
+from wipx.core.diagnosis import FoundEffect
+from wipx.core.plant import plant_of
 from wipx.core.recording import Recording
-from wipx.diagnosis.answer.caveats import caveats
+from wipx.core.results import Estimate
+from wipx.diagnosis.answer.caveats import caveats, implausible
 
 
 def recording(name: str, t: np.ndarray) -> Recording:
@@ -49,3 +53,12 @@ def test_low_passed_signals_are_told_with_what_they_hide():
 def test_a_log_that_turned_out_slow_is_told():
     (said,) = caveats((even("r1.csv"), even("r2.csv")), guessed_means=True)
     assert "slower than the controller" in said
+
+
+@pytest.mark.parametrize(("value", "warned"), [(5.06, True), (1.4, False), (0.2, True)])
+def test_an_inertia_that_is_far_from_the_owners_is_told(value: float, warned: bool):
+    size = Estimate("geometry/inertia.scale", "", 1.0, value, 0.9 * value, 1.1 * value, False, "")
+    found = FoundEffect("geometry/inertia", "", "", False, (size,), (), (), 50.0, 0.5, 1.0, 1.0, None)
+    said = implausible([found], plant_of("wip"), 2.0)
+    assert bool(said) == warned
+    assert not warned or f"Wrong moment of inertia of the body: {value:.3g} times" in said[0]

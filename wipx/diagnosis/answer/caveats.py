@@ -1,9 +1,16 @@
-"""What in the recordings themselves a reader must know before he relies on a diagnosis of them."""
+"""What a reader must know before he relies on a diagnosis: of the recordings, and of sizes that are hardly possible."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
+from wipx.core.diagnosis import FoundEffect
+from wipx.core.parameters import Parameter
+from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.diagnosis.rules import USUAL, AnswerRules
+from wipx.effects.catalogue import effect_of
+from wipx.effects.words import effect_in_words
 
 
 def caveats(
@@ -55,6 +62,26 @@ def caveats(
             f"(by {100.0 * uneven[worst]:.0f} %); they are taken as logged."
         )
     return tuple(said)
+
+
+def implausible(effects: Sequence[FoundEffect], plant: Plant, most: float) -> tuple[str, ...]:
+    """One sentence for each named effect that has an owner wrong by a factor of more than `most`."""
+    said = []
+    for effect in effects:
+        factors = [p.name for p in effect_of(effect.name, plant).parameters if is_factor(p)]
+        for size in effect.parameters:
+            off = size.low > most or size.high < 1.0 / most
+            if size.name.rpartition(".")[2] in factors and off:
+                said.append(
+                    f"{effect_in_words(effect.name, plant.kind)}: {size.value:.3g} times what the description of the "
+                    "robot says. Owners are seldom so wrong. It may stand in for physics that has no name here."
+                )
+    return tuple(sentence[0].upper() + sentence[1:] for sentence in said)
+
+
+def is_factor(parameter: Parameter) -> bool:
+    """Whether a number of an effect multiplies a number of the owner's."""
+    return parameter.dimension == "ratio" and parameter.low < parameter.neutral == 1.0 < parameter.high
 
 
 def _missing(recording: Recording, gap: float) -> int:
