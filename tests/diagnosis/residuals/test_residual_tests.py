@@ -1,14 +1,20 @@
 """Physics without a name is noticed, placed and stood in for; physics with a name leaves nothing over."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from diagnosis.recorded import Bench, bench, recorded
-from identify.emulated_robot import nominal_model
+from diagnosis.recorded import SIMULATOR, Bench, bench, recorded
+from identify.emulated_robot import RATE, Robot, nominal_model
 
+from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.residuals.discrepancy import process_mean
 from wipx.diagnosis.residuals.residual_tests import residual_tests, shapes_of
 from wipx.effects.remainder import KNOTS
 
+ANGLES = ("theta1", "theta2")
 RATE_OF_CARRIAGE = 2.0  # code of the signal in `remainder`
 WAVES = np.array([0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])  # of no law: it changes sign with speed thrice
 
@@ -70,6 +76,24 @@ def test_nothing_is_left_over_by_the_true_model(kind: str):
     found = residual_tests(case.fitter, fit, shapes_of(case.fitter, fit))
     assert min(one.p_value for one in found) * len(found) > 1e-2
     assert max(one.gain for one in found) < 20.0  # up to nine forces each
+
+
+def test_what_the_steps_of_the_simulator_err_is_not_left_over(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    exact = Robot(nominal_model("double_pendulum"), 4.0, noisy=False).record(rng, 3)
+    precise = tuple(
+        replace(one, columns={**one.columns, **{c: one[c] + 3e-5 * rng.normal(size=len(one)) for c in ANGLES}})
+        for one in exact
+    )
+    case = Bench(nominal_model("double_pendulum"), precise, {})
+    coarse = replace(SIMULATOR, step=1.0 / RATE)  # recorded with a quarter of it
+    fitter = InnovationFitter(InnovationsModel.of(coarse, case.data, case.nominal))
+    fit = fitter.converged(fitter.fit(Hypothesis.of(case.setting, (), {}), case.quiet))
+    found = residual_tests(fitter, fit, shapes_of(fitter, fit))
+    assert min(one.p_value for one in found) * len(found) > 1e-3
+    monkeypatch.setattr(InnovationFitter, "error_of_steps", lambda self, fit: np.zeros(fit.white.size))
+    found = residual_tests(fitter, fit, shapes_of(fitter, fit))
+    assert min(one.p_value for one in found) * len(found) < 1e-6
 
 
 def test_the_found_effect_leaves_nothing_over():

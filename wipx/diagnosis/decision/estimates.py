@@ -127,7 +127,7 @@ def shift_by_step(fitter: Fitter, fit: Fit) -> np.ndarray:
     """
     if not len(fit.hypothesis.cube):
         return np.zeros(0)
-    change = fitter.refined().white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
+    change = fitter.error_of_steps(fit)
     return np.abs(np.linalg.pinv(fit.information) @ (fit.jacobian[: change.size].T @ change))
 
 

@@ -243,6 +243,10 @@ class Fitter(ABC):
     def refined(self) -> Self:
         """The same with half the step of the simulator."""
 
+    def error_of_steps(self, fit: Fit) -> np.ndarray:
+        """How the white innovations of a fit change if the simulator halves its step."""
+        return self.refined().white_of(fit, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()
+
     @abstractmethod
     def first_fit(self, hypothesis: Hypothesis, levels: Any) -> Fit:
         """The fit of a hypothesis that is far from what has been fitted so far."""

@@ -89,10 +89,13 @@ def shapes_of(fitter: InnovationFitter, fit: Fit) -> list[Shape]:
 
 
 def residual_tests(fitter: InnovationFitter, fit: Fit, shapes: list[Shape]) -> list[Residual]:
-    """What each family of forces would add to a fit, the most significant first."""
+    """What each family of forces would add to a fit, the most significant first.
+
+    The direction in which the simulator's steps err counts as explained.
+    """
     white = fit.white.ravel()
-    own = fit.jacobian[: white.size]
-    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
+    own = np.column_stack([fit.jacobian[: white.size], fitter.error_of_steps(fit)])
+    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
     left = white - basis @ (basis.T @ white)
     labels = np.repeat(stretches(fitter.data)[:, None], fit.white.shape[1], axis=1).ravel()
     found = [_tested(fitter, fit, shape, basis, left, labels) for shape in shapes]
