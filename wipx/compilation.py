@@ -16,15 +16,20 @@ from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.cache import AHEAD, compiled_folder, is_kept
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
+from wipx.sim.simulator import Simulator
 
 BODY = {"body_mass": 1.0, "com_height": 0.5, "body_inertia": 0.1}
 FILTERS_ONLY = "--filters"
 _begun: "list[subprocess.Popen[bytes]]" = []  # processes that nobody waits for
 
 
-def compile_filters_meanwhile() -> None:
-    """Say that code must be compiled, if that is so, and have the filters compiled in a process of its own."""
-    if not is_kept(rollout):
+def compile_filters_meanwhile(simulator: Simulator) -> None:
+    """Say that code must be compiled, if that is so, and have the filters compiled in a process of its own.
+
+    Args:
+        simulator: That is about to be used; only the analytic one is compiled as a whole.
+    """
+    if isinstance(simulator, AnalyticSimulator) and not is_kept(rollout):
         print("compiling the simulator and the filters, once; this takes up to a minute", file=sys.stderr)
         _begun.append(_filters_in_a_process())
 

@@ -57,7 +57,7 @@ class Diagnose:
             feedback_of(description),
             description.limits,
         )
-        compile_filters_meanwhile()
+        compile_filters_meanwhile(simulator)
         with StageProgress("diagnose") as progress:
             diagnosis = diagnose(
                 recordings,

@@ -54,12 +54,13 @@ class Identify:
         request = self._request(job, robot)
         objective: Objective = job.part("objective")
         optimizer = job.part("optimizer")
-        compile_filters_meanwhile()
+        simulator = job.part("sim")
+        compile_filters_meanwhile(simulator)
         with SearchProgress() as progress:
             found = identify(
                 request,
                 split,
-                job.part("sim"),
+                simulator,
                 objective,
                 optimizer,
                 horizon=self.horizon,

@@ -40,8 +40,9 @@ class Predict:
                 f"{job.model_path}: a model of plant {model.plant.kind}, "
                 f"expected {nominal.plant.kind} as in {source.name}"
             )
-        compile_filters_meanwhile()
-        errors, traces = self.compared(nominal, model, source.load(), job.part("sim"))
+        recordings, simulator = source.load(), job.part("sim")
+        compile_filters_meanwhile(simulator)
+        errors, traces = self.compared(nominal, model, recordings, simulator)
         columns = model.plant.coordinates
         with written_together(job.out) as folder:
             for trace in traces:

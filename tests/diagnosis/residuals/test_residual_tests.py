@@ -78,6 +78,7 @@ def test_nothing_is_left_over_by_the_true_model(kind: str):
     assert max(one.gain for one in found) < 20.0  # up to nine forces each
 
 
+@pytest.mark.statistical(allowed=1.0 / 1000)
 def test_what_the_steps_of_the_simulator_err_is_not_left_over(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     exact = Robot(nominal_model("double_pendulum"), 4.0, noisy=False).record(rng, 3)
