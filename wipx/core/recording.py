@@ -69,6 +69,11 @@ class Recording:
         """Rows per second, by the median time step [Hz]."""
         return 1.0 / float(np.median(np.diff(self.t)))
 
+    @property
+    def missing(self) -> np.ndarray:
+        """Rows that the log lacks between each row and the next, shape (rows - 1,)."""
+        return np.maximum(np.rint(np.diff(self.t) * self.rate) - 1.0, 0.0)
+
     def stack(self, columns: tuple[str, ...]) -> np.ndarray:
         """Columns side by side, shape (rows, len(columns))."""
         return np.column_stack([self.columns[name] for name in columns])

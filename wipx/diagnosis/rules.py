@@ -327,9 +327,6 @@ class AnswerRules:
     )
     concentrated: float = rule(0.6, "of the mismatch", "share of an interval that is told", JUDGEMENT, 0.0)
     few_rows: float = rule(0.3, "of the rows", "rows of that interval, at most", JUDGEMENT, 1.0)
-    gap: float = rule(
-        1.5, "usual time steps", "time step beyond which rows are missing", "derived: halfway to one row", UNLIMITED
-    )
     uneven: float = rule(
         0.05, "of the usual time step", "variation of time steps from which the answer says so", JUDGEMENT, UNLIMITED
     )

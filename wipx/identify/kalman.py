@@ -125,7 +125,7 @@ def gains_along(
 
     Args:
         linear: The body along them.
-        jolts: Covariance by which coordinates move unseen from each row to the next, shape (K + 1, R, joints, joints).
+        jolts: Covariance by which the body moves unseen within each row, shape (K + 1, R, 2 joints, 2 joints).
         t: Times of the rows, shape (K + 1, R) [s].
         last: Last row of each recording, shape (R,).
         sensor: Standard deviation of each coordinate, shape (joints,) [m or rad].
@@ -179,7 +179,7 @@ def _filter(moves, t, last, sensor, rate, late, jolts, gains, covariance, innova
             if k < last[r]:
                 _predict(p, moves[k + 1, r], work)
                 _wander(p, rate, t[k + 1, r] - t[k, r])
-                p[:joints, :joints] += jolts[k, r]
+                p[: 2 * joints, : 2 * joints] += jolts[k, r]
 
 
 @inlined

@@ -22,8 +22,8 @@ from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import Linearisation, linearise_along
-from wipx.identify.mean_commands import jolts
 from wipx.identify.sensors import delays_of, scales_of, true_states
+from wipx.identify.unlogged_commands import jolts
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
@@ -203,7 +203,7 @@ class Smoother:
         return Filter(along, scale, late)
 
     def _body(self, model: Model) -> tuple[Linearisation, np.ndarray]:
-        """A model's body along the recordings, and by how much single commands move it within each row."""
+        """A model's body along the recordings, and by how much commands that are not logged move it within each row."""
         key = tuple(model.parameters.values())
         known = self._bodies.get(key)
         if known is None:

@@ -72,6 +72,24 @@ def test_innovations_of_a_wrong_model_are_not(fresh_seed: int):
     assert correlation(series, 1) > 10.0 / np.sqrt(len(series))
 
 
+def test_innovations_behind_missing_rows_are_no_larger_than_others(fresh_seed: int):
+    rng = np.random.default_rng(fresh_seed)
+    t = DT * np.arange(3000)
+    command = 5.0 * np.sin(3.0 * t) + rng.normal(size=len(t))
+    model = unit_axis({})
+    run = SIMULATOR.replay(ModelBatch(model), Inputs.of([t], [command[:, None]], [0]), np.zeros((2, 1, 1)))
+    x = run.coordinates[:, 0, 0, 0] + 1e-6 * rng.normal(size=len(t))
+    kept = np.flatnonzero((np.arange(len(t)) % 40 > 0) | (np.arange(len(t)) == 0))
+    recording = Recording("r1.csv", {"t": t[kept], "x": x[kept], "u": command[kept]})
+    case = Bench(model, (recording,), {})
+    levels = NoiseLevels(np.array([1e-3]), np.array([1e-6]))
+    gains = case.fitter.innovations_model.gains(levels, model)
+    shown = case.fitter.innovations_model.innovations(ModelBatch(model), (gains,), np.zeros(1, int), np.zeros(1))
+    behind = np.flatnonzero(recording.missing) + 1
+    for later in range(3):
+        assert np.mean(shown[0, 0, 0, behind[1:-1] + later] ** 2) < 2.0
+
+
 def test_noise_levels_come_back(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     start = NoiseLevels(5.0 * LEVELS.force, LEVELS.sensor)
@@ -194,8 +212,8 @@ def test_gains_of_many_levels_are_those_of_a_plain_kalman_filter(kind: str, late
 
 
 def unmoved(data: RecordingBatch) -> np.ndarray:
-    """The covariance by which coordinates move unseen within each row where every command is in the log."""
-    return np.zeros((*data.rows.shape, data.joints, data.joints))
+    """The covariance by which the body moves unseen within each row where every command is in the log."""
+    return np.zeros((*data.rows.shape, 2 * data.joints, 2 * data.joints))
 
 
 def plain_filter(
@@ -227,7 +245,7 @@ def plain_filter(
         drive = drive if t[k] > SETTLES else UNSETTLED * drive
         held = np.block([[dt**3 / 3.0 * drive, dt**2 / 2.0 * drive], [dt**2 / 2.0 * drive, dt * drive]])
         p = transition @ (p - gain @ s @ gain.T) @ transition.T + held
-        p[:joints, :joints] += jolts[k]
+        p += jolts[k]
     return Gains(np.array(gains), np.array(whitening))
 
 

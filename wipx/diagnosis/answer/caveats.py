@@ -44,16 +44,15 @@ def caveats(
             "The log seems to be slower than the controller: each row counts as the mean of several commands. "
             "Log every command to see more."
         )
-    missing = {one.name: _missing(one, rules.gap) for one in recordings}
-    missing = {name: rows for name, rows in missing.items() if rows}
+    missing = {one.name: int(one.missing.sum()) for one in recordings if one.missing.any()}
     if missing:
         worst = max(missing, key=lambda name: missing[name])
         whole = next(len(one) for one in recordings if one.name == worst) + missing[worst]
         said.append(
             f"Rows are missing in {len(missing)} of {len(recordings)} recordings, most in {worst} "
-            f"({missing[worst]} of {whole}); the command before a gap counts as held through it."
+            f"({missing[worst]} of {whole}); the command before a gap counts as held through it, but not as exact."
         )
-    uneven = {one.name: _unevenness(one, rules.gap) for one in recordings}
+    uneven = {one.name: _unevenness(one) for one in recordings}
     uneven = {name: varied for name, varied in uneven.items() if varied > rules.uneven}
     if uneven:
         worst = max(uneven, key=lambda name: uneven[name])
@@ -84,13 +83,7 @@ def is_factor(parameter: Parameter) -> bool:
     return parameter.dimension == "ratio" and parameter.low < parameter.neutral == 1.0 < parameter.high
 
 
-def _missing(recording: Recording, gap: float) -> int:
-    """Rows that the gaps of a recording have room for."""
-    steps = np.diff(recording.t) * recording.rate
-    return int(np.sum(np.rint(steps[steps > gap]) - 1.0))
-
-
-def _unevenness(recording: Recording, gap: float) -> float:
+def _unevenness(recording: Recording) -> float:
     """Standard deviation of the time steps without gaps, relative to the usual one."""
     steps = np.diff(recording.t) * recording.rate
-    return float(np.std(steps[steps <= gap]))
+    return float(np.std(steps[recording.missing == 0]))

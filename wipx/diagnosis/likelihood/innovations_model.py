@@ -12,8 +12,8 @@ from wipx.diagnosis.likelihood.noise_model import LARGEST
 from wipx.diagnosis.likelihood.observer import Gains, NoiseLevels, observer_gains
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along
-from wipx.identify.mean_commands import jolts
 from wipx.identify.sensors import true_states
+from wipx.identify.unlogged_commands import jolts
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
 from wipx.sim.simulator import Rollouts
@@ -34,7 +34,7 @@ class InnovationsModel:
         simulator: The engine.
         data: The recordings.
         linear: The nominal body along them.
-        jolts: Covariance by which it moves unseen within each row, shape (K + 1, R, joints, joints).
+        jolts: Covariance by which it moves unseen within each row, shape (K + 1, R, 2 joints, 2 joints).
     """
 
     simulator: AnalyticSimulator

@@ -61,7 +61,7 @@ def observer_gains(
 
     Args:
         linear: The body.
-        jolts: Covariance by which coordinates move unseen within each row, shape (K + 1, R, joints, joints).
+        jolts: Covariance by which the body moves unseen within each row, shape (K + 1, R, 2 joints, 2 joints).
         data: The recordings.
         levels: Noise.
         delays: Delay of each coordinate's sensor [s]; None for none.
@@ -147,15 +147,19 @@ def _multiply_add(total, left, right, lanes):
 
 @inlined
 def _shake(covariance, drive, jolts, dt):
-    """What white forces, held over the interval, add to the covariance, and unseen moves of the coordinates."""
+    """What white forces, held over the interval, add to the covariance, and unseen moves of the body."""
     joints, _, lanes = drive.shape
     for i in range(joints):
         for j in range(joints):
             for w in range(lanes):
-                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0 + jolts[w % len(jolts), i, j]
+                covariance[i, j, w] += drive[i, j, w] * dt[w] ** 3 / 3.0
                 covariance[i, joints + j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
                 covariance[joints + i, j, w] += drive[i, j, w] * 0.5 * dt[w] * dt[w]
                 covariance[joints + i, joints + j, w] += drive[i, j, w] * dt[w]
+    for i in range(2 * joints):
+        for j in range(2 * joints):
+            for w in range(lanes):
+                covariance[i, j, w] += jolts[w % len(jolts), i, j]
 
 
 @inlined

@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.identify.mean_commands import noise_of_means
+from wipx.identify.unlogged_commands import noise_of_means
 from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
