@@ -213,8 +213,7 @@ class InnovationFitter(Fitter):
         Args:
             fit: Where to start.
             steps: Of the logarithms, the longest first.
-            afresh: Whether the levels may be far off. Then they are also changed one by one where none of the longest
-                steps gains.
+            afresh: Whether the levels may be far off. Then they are also changed one by one where no step of all gains.
         """
         levels = self.spread_for(fit.hypothesis.model, fit.levels)
         search = _LevelSearch(self, fit.hypothesis, levels)
@@ -233,7 +232,7 @@ class InnovationFitter(Fitter):
                 gains = likelihoods[1:] - likelihoods[0]
                 move = _joined(gains, moves, free)
                 there = search.likelier([_best_of_each(gains, trials, best, free)], best)
-                if there is None and afresh and len(free) > 1 and step == steps[0]:
+                if there is None and afresh and len(free) > 1:
                     there = search.changed_alone(best, np.concatenate(free), step, centre)
                 if there is None:
                     break

@@ -89,7 +89,10 @@ class InnovationsModel:
             data.measured, shown.coordinates, shown.rates, data.channels, whitening, group, data.inputs.last, found
         )
         if shown.delivered is not None:
-            _report_errors(data.reported, shown.delivered, data.counted, data.inputs.last, len(data.channels), found)
+            motion = len(data.channels)
+            _report_errors(data.reported, shown.delivered, data.counted, data.inputs.last, motion, found)
+            for r, k in self._untold:
+                found[:, r, motion:, k : k + TAPS] = 0.0
         return found
 
     def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
@@ -112,6 +115,12 @@ class InnovationsModel:
                 reports=self.data.reported.shape[1] > 0,
             ),
         )
+
+    @cached_property
+    def _untold(self) -> list[tuple[int, int]]:
+        """Recording and first row behind each gap: what the drives report there answers to commands of the gap."""
+        gaps = [(r, np.flatnonzero(recording.missing)) for r, recording in enumerate(self.data.recordings)]
+        return [(r, int(k) + 1) for r, rows in gaps for k in rows]
 
     @cached_property
     def _first_rows(self) -> np.ndarray:
