@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import hydra
+import yaml
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from hydra.types import RunMode
@@ -46,6 +47,7 @@ REFUSED_BY_DISK = {
 }
 LAUNCHERS = ("joblib", "submitit", "ray")  # packages whose errors are a launcher's
 NEW_LINE = "\n"
+HELP = Path("hydra") / "help" / "wipx.yaml"
 
 
 def main() -> int:
@@ -64,6 +66,9 @@ def main() -> int:
         with _removed_if_left_empty(Path(HydraConfig.get().runtime.output_dir), started) as out:
             _run_reported(config, out)
 
+    if sys.argv[1:] in (["--help"], ["-h"]):
+        print(help_text())
+        return DONE
     try:
         arguments = unambiguous(spelled_out(renamed(sys.argv[1:])))
         # Hydra does not read overrides on both sides of a flag.
@@ -89,6 +94,19 @@ def configuration_folder() -> Path:
     package = Path(__file__).resolve().parent
     inside = package / "conf"
     return inside if inside.is_dir() else package.parent / "conf"
+
+
+def help_text() -> str:
+    """What `--help` says: the template of Hydra's help with all groups, read off the folder, which takes no time."""
+    folder = configuration_folder()
+    template = yaml.safe_load((folder / HELP).read_text(encoding="utf-8"))["template"]
+    options: dict[str, list[str]] = {}
+    for path in sorted(folder.rglob("*/*.yaml")):
+        group = path.parent.relative_to(folder).as_posix()
+        if not group.startswith("hydra"):
+            options.setdefault(group, []).append(path.stem)
+    groups = "".join(f"{group}: {', '.join(names)}\n" for group, names in sorted(options.items()))
+    return template.replace("$APP_CONFIG_GROUPS", groups).replace("\\${", "${").replace("$$", "$")
 
 
 def run_task(config: DictConfig, out: Path) -> None:

@@ -6,10 +6,8 @@ import pytest
 from diagnosis.recorded import Bench, nominal_model, recorded
 
 import wipx.compilation
-from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim import first_use
 from wipx.sim.cache import AHEAD
-from wipx.sim.mujoco import MujocoSimulator
-from wipx.sim.simulator import Simulator
 
 
 def test_filters_are_compiled_ahead_for_the_arrays_of_a_diagnosis(fresh_seed: int):
@@ -23,19 +21,20 @@ def test_filters_are_compiled_ahead_for_the_arrays_of_a_diagnosis(fresh_seed: in
 
 def test_nothing_is_said_where_all_is_compiled(capfd: pytest.CaptureFixture[str]):
     wipx.compilation.compile_simulator()
-    wipx.compilation.compile_filters_meanwhile(AnalyticSimulator())
+    capfd.readouterr()
+    first_use.compile_filters_meanwhile.cache_clear()
+    wipx.compilation.compile_simulator()
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.parametrize(
-    ("simulator", "begun"), [(AnalyticSimulator(), 1), (MujocoSimulator(), 0)], ids=["own", "other"]
-)
-def test_a_task_that_finds_nothing_compiled_says_so(
-    simulator: Simulator, begun: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+def test_a_program_that_finds_nothing_compiled_says_so_once(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ):
-    calls: list[list[str]] = []
-    monkeypatch.setattr(wipx.compilation, "is_kept", lambda kernel: False)
+    calls: list[tuple[str, ...]] = []
+    monkeypatch.setattr(first_use, "is_kept", lambda kernel: False)
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: calls.append(command))
-    wipx.compilation.compile_filters_meanwhile(simulator)
-    assert len(calls) == begun
-    assert ("compiling the simulator" in capfd.readouterr().err) == bool(begun)
+    first_use.compile_filters_meanwhile.cache_clear()
+    for _ in range(2):
+        wipx.compilation.compile_simulator()
+    assert calls == [first_use.FILTERS]
+    assert capfd.readouterr().err.count("compiling the simulator") == 1

@@ -17,6 +17,7 @@ from wipx.core.errors import check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.sim import rows as R
 from wipx.sim.coefficients import coefficients
+from wipx.sim.first_use import compile_filters_meanwhile
 from wipx.sim.inputs import Inputs
 from wipx.sim.kernel import rollout
 from wipx.sim.layout import ClosedLoop, Layout
@@ -206,6 +207,7 @@ class _Run:
         self, states, first_row, last_row, commands=None, loop: ClosedLoop | None = None, observer=None, path=None
     ) -> None:
         """Simulate rows; `commands` (K, N, lanes) are per lane, otherwise the inputs' own are replayed."""
+        compile_filters_meanwhile()
         per_lane = commands is not None
         closed, ramps = loop is not None, None
         if commands is None:

@@ -30,9 +30,15 @@ NO_LIMIT = 1e12  # [N m or N] of a drive without one
 ON = "ON_"  # names of flags begin so
 
 
-@part
-def no_tree(S, B, n, on, asked):
-    """Stand for the code of a tree where there is none."""
+@cache
+def no_tree() -> Any:
+    """What stands for the code of a tree where there is none; loaded when it is needed first."""
+
+    @part
+    def nothing(S, B, n, on, asked):
+        pass
+
+    return nothing
 
 
 @dataclass(frozen=True)
@@ -198,7 +204,7 @@ def _wip_family(f: _Filler) -> Any:
         for row, after, before in zip(deltas, loaded_body, plain, strict=True):
             f.body[row] = after - before
     f.body[B.TILT_FORCE] = plain[4]
-    return no_tree
+    return no_tree()
 
 
 def _rigid_body(f: _Filler, *, with_event: bool) -> tuple[np.ndarray, ...]:
@@ -246,7 +252,7 @@ def _double_pendulum(f: _Filler) -> Any:
     f.body[B.DP_GRAVITY] = mass2 * com2 * gravity
     f.body[B.DP_GRAVITY1] = (mass1 * com1 + mass2 * length1) * gravity
     f.on[R.ON_DOUBLE] = True
-    return no_tree
+    return no_tree()
 
 
 def _tree(f: _Filler, tree: Tree) -> Any:

@@ -5,16 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wipx.compilation import compile_filters_meanwhile
 from wipx.core.diagnosis import Diagnosis
 from wipx.core.errors import InputError
-from wipx.diagnosis.pipeline import KnownRobot, diagnose
-from wipx.library import feedback_of
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.report.diagnosis_json import diagnosis_json
 from wipx.report.diagnosis_summary import summary
-from wipx.sim.analytic import AnalyticSimulator
 from wipx.tasks.files.results import write_csv, write_json, written_together
 from wipx.tasks.files.tracked import error_metrics, log_run, note_run, parameter_metrics, recorded_data
 from wipx.tasks.shared.job import Job
@@ -46,18 +42,22 @@ class Diagnose:
         Raises:
             InputError: the simulator has no observer, or the recordings or their description are at fault.
         """
+        description = source.describe()
+        recordings = source.load()
+        # Slow to import: input at fault is refused before.
+        from wipx.diagnosis.pipeline import KnownRobot, diagnose
+        from wipx.library import feedback_of
+        from wipx.sim.analytic import AnalyticSimulator
+
         simulator = job.part("sim")
         if not isinstance(simulator, AnalyticSimulator):
             raise InputError("a diagnosis follows recordings with an observer, which sim=analytic alone has; choose it")
-        description = source.describe()
-        recordings = source.load()
         robot = KnownRobot(
             job.part("plant").nominal(description.model),
             description.uncertainty,
             feedback_of(description),
             description.limits,
         )
-        compile_filters_meanwhile(simulator)
         with StageProgress("diagnose") as progress:
             diagnosis = diagnose(
                 recordings,

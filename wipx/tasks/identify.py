@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wipx.compilation import compile_filters_meanwhile
 from wipx.core.errors import check_positive
 from wipx.core.model import Model
 from wipx.core.plant import Plant
@@ -55,7 +54,6 @@ class Identify:
         objective: Objective = job.part("objective")
         optimizer = job.part("optimizer")
         simulator = job.part("sim")
-        compile_filters_meanwhile(simulator)
         with SearchProgress() as progress:
             found = identify(
                 request,

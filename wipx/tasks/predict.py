@@ -5,7 +5,6 @@ from pathlib import Path, PurePath
 
 import numpy as np
 
-from wipx.compilation import compile_filters_meanwhile
 from wipx.core.errors import InputError
 from wipx.core.model import Model
 from wipx.core.recording import Recording
@@ -41,7 +40,6 @@ class Predict:
                 f"expected {nominal.plant.kind} as in {source.name}"
             )
         recordings, simulator = source.load(), job.part("sim")
-        compile_filters_meanwhile(simulator)
         errors, traces = self.compared(nominal, model, recordings, simulator)
         columns = model.plant.coordinates
         with written_together(job.out) as folder:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
@@ -206,6 +205,8 @@ def _of_drives(model: Model, motion: Motion, kept: slice, ranges: Ranges) -> np.
 
 def _lagged(forces: np.ndarray, steps: float) -> np.ndarray:
     """What a first-order lag of 1/steps rows makes of forces, from rest at the first row."""
+    from scipy.signal import lfilter  # slow to import, and only robots from model files need it
+
     share = 1.0 - np.exp(-steps)
     first = (1.0 - share) * forces[:1]
     return np.asarray(lfilter([share], [1.0, share - 1.0], forces, axis=0, zi=first)[0])

@@ -2,11 +2,12 @@
 
 import sys
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from tqdm import tqdm
 
-from wipx.identify.optimizers.search import Progress
+if TYPE_CHECKING:
+    from wipx.identify.optimizers.search import Progress
 
 
 class _Bar:
@@ -47,7 +48,7 @@ class SearchProgress(_Bar):
     def __init__(self, label: str = "identify") -> None:
         super().__init__(label)
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: "Progress") -> None:
         """Show where the search is."""
         self.show(progress.share, f"loss {progress.best_loss:.4g}, {progress.evaluations} evaluations")
 
