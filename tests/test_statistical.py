@@ -45,6 +45,7 @@ def test_without_a_seed_a_claim_is_drawn_once(tmp_path: Path):
     assert "2 passed" in run(tmp_path, 0.0).stdout
 
 
+@pytest.mark.slow
 def test_a_claim_that_fails_seldom_passes_and_one_that_fails_often_fails(tmp_path: Path):
     seldom = run(tmp_path, 0.1, "--seed=5")
     assert seldom.returncode == 0, seldom.stdout

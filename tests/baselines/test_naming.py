@@ -20,7 +20,9 @@ NAMING = {
 }
 
 
-@pytest.mark.parametrize("name", NAMING)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n == "all_at_once" else []) for n in NAMING]
+)
 @pytest.mark.parametrize(
     "effects", [COULOMB, pytest.param(VISCOUS, marks=pytest.mark.slow)], ids=["coulomb", "viscous"]
 )

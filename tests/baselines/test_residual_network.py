@@ -14,6 +14,7 @@ from wipx.core.errors import InputError
 from wipx.identify.evaluation import Judge
 
 
+@pytest.mark.slow
 def test_a_network_predicts_better_and_names_nothing(fresh_seed: int):
     pytest.importorskip("torch")
     rng = np.random.default_rng(fresh_seed)

@@ -268,6 +268,7 @@ def outcomes(folder: Path) -> Iterator[tuple[str, Outcome]]:
     yield KILLED, killed(folder / "killed.asc")
 
 
+@pytest.mark.slow
 def test_the_table_of_the_documentation_is_what_happens(clock: None, request: pytest.FixtureRequest, tmp_path: Path):
     head = ("| fault | the trial | the motor | what is left |", "| --- | --- | --- | --- |")
     rows = [f"| {name} | {one.end} | {one.motor} | {one.left} |" for name, one in outcomes(tmp_path)]

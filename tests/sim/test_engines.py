@@ -62,7 +62,11 @@ def forceful(kind: str, name: str) -> Model:
 
 @EVERY
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.slow] if kind == "cartpole" else []) for kind in sorted(PLANTS)]
+    "kind",
+    [
+        pytest.param(kind, marks=[pytest.mark.slow] if kind in ("cartpole", "double_pendulum") else [])
+        for kind in sorted(PLANTS)
+    ],
 )
 def test_engines_agree_over_the_papers_window(engine: SteppedSimulator, kind: str):
     t = np.linspace(0.0, 1.2, 121)

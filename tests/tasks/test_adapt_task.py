@@ -27,6 +27,7 @@ def result(folder: Path) -> dict:
     return json.loads((folder / "result.json").read_text())["result"]
 
 
+@pytest.mark.slow
 def test_an_adapted_simulation_is_closer_to_the_robot_also_with_loads_it_never_saw(program: Program, tmp_path: Path):
     before = program("task=adapt", "method=pure_sim", *ROBOT, "hydra.run.dir=before")
     after = program("task=adapt", "method=ours", *ROBOT, *SEARCH, "hydra.run.dir=after")
@@ -56,6 +57,7 @@ def test_a_finished_job_is_not_repeated_and_one_with_other_settings_is_refused(p
     assert "seed (0 before, 7 now)" in other.error
 
 
+@pytest.mark.slow
 def test_a_robot_emulated_by_another_simulator_is_recorded_anew(
     program: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.slow
 def test_the_estimated_balance_stands_in_place_where_the_nominal_one_does_not(program, tmp_path: Path):
     made = program("task=balance", "sim=mujoco", "task.settle=5", "task.rest=3", "hydra.run.dir=out")
     assert (made.status, made.error) == (0, "")

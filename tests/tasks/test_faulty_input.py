@@ -130,6 +130,7 @@ def test_arguments_at_fault(program, folder, tmp_path: Path, fault: str):
     assert sorted(path.name for path in folder.path.iterdir()) == ["a.csv", "b.csv", "robot.yaml"]
 
 
+@pytest.mark.slow
 def test_results_of_an_earlier_run_survive_a_failure(program, folder, tmp_path: Path):
     arguments = ("task=predict", f"recordings.path={folder.path}", "hydra.run.dir=out")
     assert program(*arguments).status == 0

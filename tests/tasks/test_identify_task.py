@@ -90,6 +90,7 @@ def heeds_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_leaves_one_line_and_no_file(folder, tmp_path: Path):
     endless = ("optimizer=pso", "optimizer.iterations=1000000", "tracking=none", "task=identify")
     command = [sys.executable, "-m", "wipx", *endless, f"recordings.path={folder.path}", "hydra.run.dir=out"]

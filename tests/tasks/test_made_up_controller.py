@@ -76,6 +76,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> str:
     return add_option(monkeypatch, tmp_path, "controller", TwoStep, limit=90.0)
 
 
+@pytest.mark.slow
 def test_a_controller_in_one_file_drives_the_robot_with_an_estimator_trained_for_it(
     program: Program, tmp_path: Path, made_up: str
 ):

@@ -24,6 +24,7 @@ class Perceptron(NetworkRecipe):
         return nn.Sequential(nn.Flatten(), nn.Linear(2 * length, self.hidden), nn.Tanh(), nn.Linear(self.hidden, 1))
 
 
+@pytest.mark.slow
 def test_a_network_in_one_file_is_trained_and_judged(program: Program, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     found = add_option(monkeypatch, tmp_path, "estimator", Perceptron, hidden=8, epochs=20)
     answer = program(*SMALL, "estimator=made_up", "estimator.hidden=12", found, "hydra.run.dir=out")

@@ -84,6 +84,7 @@ def test_a_drive_that_does_not_sag_does_not_in_the_completed_model(fresh_seed: i
     assert completed(knowing, friction) is friction
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_beside_a_sag_and_leaves_it_in_place(fresh_seed: int):
     hidden = {**FRICTION, **SAG, "translation/viscous": {"sigma": 2.0}}
     case = shaken(bench("linear_axis", hidden, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))

@@ -77,7 +77,9 @@ def example(folder: Path) -> tuple[Model, Recordings]:
     return source.describe().model, tuple(r.between(r.t[0], r.t[0] + 3.0) for r in source.load()[:3])
 
 
-@pytest.mark.parametrize("name", MISSING)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n == "friction" else []) for n in MISSING]
+)
 def test_missing_physics_is_no_mistake(name: str, fresh_seed: int):
     model = nominal_model("wip")
     recordings = Robot(model.with_effects(MISSING[name])).record(np.random.default_rng(fresh_seed), 1)

@@ -49,6 +49,7 @@ def best_single_change(fitter: InnovationFitter, hypothesis: Hypothesis, levels:
     return max(totals[1:]) - totals[0]
 
 
+@pytest.mark.slow
 def test_no_joint_alone_is_left_at_a_wrong_level(tmp_path: Path):
     rng = np.random.default_rng(HARD)
     write_files(tmp_path, draw_files(rng, "tree_nothing", (3.0, 3.5), 5).visible)

@@ -51,6 +51,7 @@ def test_the_search_begins_at_the_spring_where_forces_ask_for_what_imitates_it(t
     assert RobotSearch.of(store, nominal).begun().effects == (SPRING,)
 
 
+@pytest.mark.slow
 def test_a_drive_that_swings_unseen_is_an_inertia_at_the_joint(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     inertia = {"elbow/rotor_inertia": {"J": TRUE["drive_inertia"]}}

@@ -10,6 +10,7 @@ from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import search_of
 
 
+@pytest.mark.slow
 def test_coulomb_friction_and_a_constant_force_of_the_drive_are_one_law(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     hidden = {"elbow/asymmetric_coulomb": {"F_plus": 0.05, "F_minus": 0.02}}
@@ -24,6 +25,7 @@ def test_coulomb_friction_and_a_constant_force_of_the_drive_are_one_law(tmp_path
     assert found.hypothesis.values["elbow/asymmetric_coulomb.F_minus"] == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.slow
 def test_friction_that_is_alike_both_ways_is_the_plain_law(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     case = Bench(model, (recorded(model.with_effects({"elbow/coulomb": {"F_c": 0.04}}), fresh_seed),), {})

@@ -55,9 +55,8 @@ LOAD = {"link_lower/payload": {"mass": 0.1, "x": 0.01, "y": 0.02, "z": -0.25}}
 FRICTION = {"shoulder/coulomb": {"F_c": 0.08}, "elbow/coulomb": {"F_c": 0.04}}
 
 
-@pytest.mark.parametrize(
-    "hidden", [ROTOR | FRICTION, pytest.param(LOAD | FRICTION, marks=pytest.mark.slow)], ids=["rotor", "load"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", [ROTOR | FRICTION, LOAD | FRICTION], ids=["rotor", "load"])
 def test_a_load_and_a_rotor_are_told_apart_beside_friction(
     hidden: dict[str, dict[str, float]], tmp_path: Path, fresh_seed: int
 ):

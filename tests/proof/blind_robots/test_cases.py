@@ -40,7 +40,10 @@ def short(scenario):
     return replace(scenario, rows=rows, end=end, instants=scenario.instants[: end + 1], force_noise=noise, **parts)
 
 
-@pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis", "double_pendulum"])
+@pytest.mark.parametrize(
+    "kind",
+    ["pendulum", "linear_axis", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("wip", "double_pendulum"))],
+)
 def test_every_effect_and_every_unmodelled_physics_changes_the_recordings(kind: str):
     rng = np.random.default_rng(8)
     robot, settings = draw_robot(kind, rng), draw_log_settings(kind, rng, poor=False)

@@ -106,6 +106,7 @@ def test_each_group_is_diagnosed_and_predicts_the_others(program, axis: Path, tm
     assert (out / "sizes.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_group_that_is_done_is_only_given_to_methods_that_are_missing(
     program, axis: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
