@@ -100,13 +100,11 @@ def diagnose(
     by_forces = numbers_by_forces(robot.nominal, halves) if robot.nominal.plant.tree is not None else {}
     setting = Setting(robot.nominal, robot.uncertainty, scales_of(robot.nominal, halves), by_forces=by_forces)
     suspected = check_suspects(suspects or {}, setting.nominal, setting.scales)
-    context = replace(Context.of(halves, setting, simulator, rules), several=len(recordings) > 1)
+    rate_is_known = robot.nominal.plant.tree is None or robot.feedback is not None
+    context = Context.of(halves, setting, simulator, rules)
+    context = replace(context, several=len(recordings) > 1, rate_is_known=rate_is_known)
     watcher("noise of the nominal model", 0.02)
     nominal = context.by_row.first_fit(Hypothesis.of(setting, (), {}), context.first_levels)
-    if setting.nominal.plant.tree is not None and robot.feedback is None:
-        as_logged, context = context, context.reading_means(nominal)
-        if context is not as_logged:
-            nominal = context.by_row.first_fit(nominal.hypothesis, nominal.levels)
     fitter = context.by_row
     store = FitStore.of(fitter, setting, nominal)
     watcher("looking for missing effects", 0.1)

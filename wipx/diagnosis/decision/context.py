@@ -37,6 +37,7 @@ class Context:
         judge: Predicts recordings.
         recordings: Of the robot.
         several: Whether they are runs of their own, not halves of one.
+        rate_is_known: Whether it is known if the log is slower than the controller.
     """
 
     fitter: Fitter
@@ -46,6 +47,7 @@ class Context:
     judge: Judge
     recordings: tuple[Recording, ...]
     several: bool = True
+    rate_is_known: bool = False
 
     @classmethod
     def of(
@@ -64,22 +66,23 @@ class Context:
     def reading_means(self, held: Fit) -> "Context":
         """The same with rows that have means of commands, if every recording is likelier so; else itself.
 
-        If the log is slower than the controller, single commands shake the joints within a row, several at once. That
-        shows in every recording; what a model lacks looks like it in some.
+        What a model lacks looks like it in some recordings. So the first effects must have been found.
 
         Args:
             held: A fit by innovations, of commands that were held over each row.
         """
+        if self.rate_is_known:
+            return self
         recordings = tuple(replace(recording, periods=2) for recording in self.recordings)
         data = RecordingBatch.of(recordings, self.data.plant)
         model = InnovationsModel.of(self.by_row.simulator, data, self.setting.nominal)
-        shaken = replace(self.by_row.innovations_model, jolts=model.jolts, _known={})
-        fitter = replace(self.by_row, innovations_model=shaken)
-        again = fitter.first_fit(held.hypothesis, held.levels)
-        gains = fitter.by_recording(again, again.white) - self.by_row.by_recording(held, held.white)
-        if gains.min() <= 0.0 or gains.sum() <= self.rules.selection.least_gain:
-            return self
         fitter = replace(self.by_row, innovations_model=model)
+        again = fitter.first_fit(held.hypothesis, held.levels)
+        silent = self.by_row.without_reports()
+        motion = silent.fit(held.hypothesis, held.levels, steps=0)
+        gains = fitter.by_recording(again, again.white) - silent.by_recording(motion, motion.white)
+        if gains.min() <= 0.0 or gains.mean() <= self.rules.selection.least_gain:
+            return self
         return replace(self, fitter=fitter, by_row=fitter, recordings=recordings)
 
     def beside(self, search: Search) -> "Context":

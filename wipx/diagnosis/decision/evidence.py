@@ -72,6 +72,11 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
         ahead = _by_forecasts_and_forces(context, chosen.fit, watcher, afresh=True)
         return ahead or _by_innovations(context, search, chosen, watcher)
     begun = search.grown(steps=1)
+    as_logged, context = context, context.reading_means(begun.fit)
+    if context is not as_logged:
+        nominal = context.by_row.first_fit(search.nominal.hypothesis, search.nominal.levels)
+        search = RobotSearch.of(FitStore.of(context.by_row, context.setting, nominal), nominal, context.held_out)
+        begun = search.grown(steps=1).after(begun.considered)
     if not context.holds_somewhere(begun.fit):
         ahead = _by_forecasts_and_forces(context, begun.fit, watcher, afresh=True)
         if ahead is not None:

@@ -93,6 +93,11 @@ class InnovationFitter(Fitter):
         data = replace(self.data, left_out=recordings)
         return replace(self, innovations_model=replace(self.innovations_model, data=data))
 
+    def without_reports(self) -> "InnovationFitter":
+        """The same with logs in which no drive reports its force."""
+        data = replace(self.data, reported=self.data.reported[:, :0])
+        return replace(self, innovations_model=replace(self.innovations_model, data=data))
+
     def beside(self, setting: Setting) -> "InnovationFitter":
         """The same for one part of a robot: noise is searched for on its joint; on all joints if it has none."""
         own = (j for j, joint in enumerate(self.data.plant.joints) if setting.sites and joint in setting.sites)
