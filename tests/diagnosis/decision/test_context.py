@@ -90,7 +90,7 @@ def reads_means(recordings: list[Recording]) -> bool:
     """Whether the rows of some logs are taken for means of commands."""
     case = Bench(nominal_model("double_pendulum"), tuple(recordings), {})
     context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
-    return context.reading_means(case.fit()).data.has_means
+    return context.reread(case.fit()).data.has_means
 
 
 @pytest.mark.parametrize("every", [1, 2])
@@ -99,6 +99,11 @@ def test_a_log_that_is_slower_than_the_controller_is_recognised(every: int, fres
     logged = shaken_pendulums(np.random.default_rng(fresh_seed), (0.0, 0.0, 0.0))
     slower = [replace(thinned(one, np.arange(0, len(one), every)), periods=1) for one in logged]
     assert reads_means(slower) == (every > 1)
+
+
+def test_held_commands_that_were_taken_for_means_are_read_as_held_again(fresh_seed: int):
+    logged = shaken_pendulums(np.random.default_rng(fresh_seed), (0.0, 0.0, 0.0))
+    assert not reads_means([replace(one, periods=2) for one in logged])
 
 
 @pytest.mark.parametrize("seed", [0, 7, None])  # of the first two, all recordings together are likelier as slow logs

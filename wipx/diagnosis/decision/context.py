@@ -63,27 +63,29 @@ class Context:
         fitter = InnovationFitter(InnovationsModel.of(engine, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(engine, noise, HORIZON), recordings)
 
-    def reading_means(self, held: Fit) -> "Context":
-        """The same with rows that have means of commands, if every recording is likelier so; else itself.
+    def reread(self, fit: Fit) -> "Context":
+        """The same with rows that have means of commands instead of held ones, or held ones again; else itself.
 
-        What a model lacks looks like it in some recordings. So the first effects must have been found.
+        Rows are read the other way where every recording is likelier so, if it is not known what they have. What a
+        model lacks may look like it. So the first effects must have been found, and at the end the reading is tested
+        once more.
 
         Args:
-            held: A fit by innovations, of commands that were held over each row.
+            fit: By innovations, of rows as they are read here.
         """
         if self.rate_is_known:
             return self
-        recordings = tuple(replace(recording, periods=2) for recording in self.recordings)
+        periods = 1 if self.data.has_means else 2
+        recordings = tuple(replace(recording, periods=periods) for recording in self.recordings)
         data = RecordingBatch.of(recordings, self.data.plant)
         model = InnovationsModel.of(self.by_row.simulator, data, self.setting.nominal)
-        fitter = replace(self.by_row, innovations_model=model)
-        again = fitter.first_fit(held.hypothesis, held.levels)
-        silent = self.by_row.without_reports()
-        motion = silent.fit(held.hypothesis, held.levels, steps=0)
-        gains = fitter.by_recording(again, again.white) - silent.by_recording(motion, motion.white)
+        other = replace(self.by_row, innovations_model=model)
+        here, there = self.by_row.without_reports(), other.without_reports()  # of single commands
+        read, again = here.fit(fit.hypothesis, fit.levels, steps=0), there.first_fit(fit.hypothesis, fit.levels)
+        gains = there.by_recording(again, again.white) - here.by_recording(read, read.white)
         if gains.min() <= 0.0 or gains.mean() <= self.rules.selection.least_gain:
             return self
-        return replace(self, fitter=fitter, by_row=fitter, recordings=recordings)
+        return replace(self, fitter=other, by_row=other, recordings=recordings)
 
     def beside(self, search: Search) -> "Context":
         """The same for the part of a robot that a search looks at."""

@@ -72,11 +72,9 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
         ahead = _by_forecasts_and_forces(context, chosen.fit, watcher, afresh=True)
         return ahead or _by_innovations(context, search, chosen, watcher)
     begun = search.grown(steps=1)
-    as_logged, context = context, context.reading_means(begun.fit)
-    if context is not as_logged:
-        nominal = context.by_row.first_fit(search.nominal.hypothesis, search.nominal.levels)
-        search = RobotSearch.of(FitStore.of(context.by_row, context.setting, nominal), nominal, context.held_out)
-        begun = search.grown(steps=1).after(begun.considered)
+    context, again = _reread(context, search, begun.fit)
+    if again is not search:
+        search, begun = again, again.grown(steps=1).after(begun.considered)
     if not context.holds_somewhere(begun.fit):
         ahead = _by_forecasts_and_forces(context, begun.fit, watcher, afresh=True)
         if ahead is not None:
@@ -84,9 +82,21 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
             if not context.holds_somewhere(begun.fit):
                 return ahead
     chosen = search.run(begun.fit).after(begun.considered)
+    context, again = _reread(context, search, chosen.fit)
+    if again is not search:
+        search, chosen = again, again.run(again.fit_from(chosen.fit)).after(chosen.considered)
     holds = context.is_quiet(chosen.fit) and context.holds_somewhere(chosen.fit)
     ahead = None if holds else _by_forecasts_and_forces(context, chosen.fit, watcher)
     return ahead or _by_innovations(context, search, chosen, watcher)
+
+
+def _reread(context: Context, search: RobotSearch, fit: Fit) -> tuple[Context, RobotSearch]:
+    """The means with rows read the likelier way beside a fit (`Context.reread`), and a search by them."""
+    likelier = context.reread(fit)
+    if likelier is context:
+        return context, search
+    nominal = likelier.by_row.first_fit(search.nominal.hypothesis, search.nominal.levels)
+    return likelier, RobotSearch.of(FitStore.of(likelier.by_row, likelier.setting, nominal), nominal, likelier.held_out)
 
 
 def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: Watcher) -> Found:
