@@ -86,11 +86,12 @@ def shaken_pendulums(rng: np.random.Generator, unknown: tuple[float, ...]) -> li
     return recordings
 
 
-def reads_means(recordings: list[Recording]) -> bool:
-    """Whether the rows of some logs are taken for means of commands."""
+def otherwise_is_likelier(recordings: list[Recording]) -> bool:
+    """Whether rows of some logs are likelier with means of commands if they are taken for held ones, or held if not."""
     case = Bench(nominal_model("double_pendulum"), tuple(recordings), {})
-    context = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
-    return context.reread(case.fit()).data.has_means
+    here = Context.of(case.recordings, case.setting, SIMULATOR, USUAL)
+    there, fit = here.read_otherwise(), case.fit()
+    return there.is_likelier(there.by_row.first_fit(fit.hypothesis, fit.levels), here, fit)
 
 
 @pytest.mark.parametrize("every", [1, 2])
@@ -98,15 +99,15 @@ def test_a_log_that_is_slower_than_the_controller_is_recognised(every: int, fres
     """Single commands of one joint shake the other joint too, which noise of the sensors does not."""
     logged = shaken_pendulums(np.random.default_rng(fresh_seed), (0.0, 0.0, 0.0))
     slower = [replace(thinned(one, np.arange(0, len(one), every)), periods=1) for one in logged]
-    assert reads_means(slower) == (every > 1)
+    assert otherwise_is_likelier(slower) == (every > 1)
 
 
 def test_held_commands_that_were_taken_for_means_are_read_as_held_again(fresh_seed: int):
     logged = shaken_pendulums(np.random.default_rng(fresh_seed), (0.0, 0.0, 0.0))
-    assert not reads_means([replace(one, periods=2) for one in logged])
+    assert otherwise_is_likelier([replace(one, periods=2) for one in logged])
 
 
 @pytest.mark.parametrize("seed", [0, 7, None])  # of the first two, all recordings together are likelier as slow logs
 def test_what_shakes_one_recording_only_is_no_slow_log(seed: int | None, fresh_seed: int):
     rng = np.random.default_rng(fresh_seed if seed is None else seed)
-    assert not reads_means(shaken_pendulums(rng, (0.3, 0.0, 0.0, 0.0, 0.0)))
+    assert not otherwise_is_likelier(shaken_pendulums(rng, (0.3, 0.0, 0.0, 0.0, 0.0)))

@@ -63,29 +63,31 @@ class Context:
         fitter = InnovationFitter(InnovationsModel.of(engine, data, setting.nominal), rules)
         return cls(fitter, fitter, setting, levels, Judge(engine, noise, HORIZON), recordings)
 
-    def reread(self, fit: Fit) -> "Context":
-        """The same with rows that have means of commands instead of held ones, or held ones again; else itself.
-
-        Rows are read the other way where every recording is likelier so, if it is not known what they have. What a
-        model lacks may look like it. So the first effects must have been found, and at the end the reading is tested
-        once more.
-
-        Args:
-            fit: By innovations, of rows as they are read here.
-        """
-        if self.rate_is_known:
-            return self
+    def read_otherwise(self) -> "Context":
+        """The same with rows that have means of two commands instead of held ones, or held ones again."""
         periods = 1 if self.data.has_means else 2
         recordings = tuple(replace(recording, periods=periods) for recording in self.recordings)
         data = RecordingBatch.of(recordings, self.data.plant)
         model = InnovationsModel.of(self.by_row.simulator, data, self.setting.nominal)
-        other = replace(self.by_row, innovations_model=model)
-        here, there = self.by_row.without_reports(), other.without_reports()  # of single commands
-        read, again = here.fit(fit.hypothesis, fit.levels, steps=0), there.first_fit(fit.hypothesis, fit.levels)
-        gains = there.by_recording(again, again.white) - here.by_recording(read, read.white)
-        if gains.min() <= 0.0 or gains.mean() <= self.rules.selection.least_gain:
-            return self
-        return replace(self, fitter=other, by_row=other, recordings=recordings)
+        fitter = replace(self.by_row, innovations_model=model)
+        return replace(self, fitter=fitter, by_row=fitter, recordings=recordings)
+
+    def is_likelier(self, fit: Fit, other: "Context", other_fit: Fit) -> bool:
+        """Whether every recording is likelier, as its rows are read here, than as they are read otherwise.
+
+        Args:
+            fit: By innovations, of rows as they are read here.
+            other: Reads them otherwise.
+            other_fit: By its innovations.
+        """
+        gains = self._motion_likelihoods(fit) - other._motion_likelihoods(other_fit)
+        return bool(gains.min() > 0.0 and gains.mean() > self.rules.selection.least_gain)
+
+    def _motion_likelihoods(self, fit: Fit) -> np.ndarray:
+        """Log-likelihood of each recording without forces that drives report, which are of single commands; (R,)."""
+        fitter = self.by_row.without_reports()
+        motion = fitter.fit(fit.hypothesis, fit.levels, steps=0)
+        return fitter.by_recording(motion, motion.white)
 
     def beside(self, search: Search) -> "Context":
         """The same for the part of a robot that a search looks at."""

@@ -72,9 +72,10 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
         ahead = _by_forecasts_and_forces(context, chosen.fit, watcher, afresh=True)
         return ahead or _by_innovations(context, search, chosen, watcher)
     begun = search.grown(steps=1)
-    context, again = _reread(context, search, begun.fit)
-    if again is not search:
-        search, begun = again, again.grown(steps=1).after(begun.considered)
+    means = _means_read(context, begun.fit)
+    if means is not None:
+        context, search = means, _search_by(means, search.nominal)
+        begun = search.grown(steps=1).after(begun.considered)
     if not context.holds_somewhere(begun.fit):
         ahead = _by_forecasts_and_forces(context, begun.fit, watcher, afresh=True)
         if ahead is not None:
@@ -82,21 +83,45 @@ def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> F
             if not context.holds_somewhere(begun.fit):
                 return ahead
     chosen = search.run(begun.fit).after(begun.considered)
-    context, again = _reread(context, search, chosen.fit)
-    if again is not search:
-        search, chosen = again, again.run(again.fit_from(chosen.fit)).after(chosen.considered)
+    context, search, chosen = _reread(context, search, chosen)
     holds = context.is_quiet(chosen.fit) and context.holds_somewhere(chosen.fit)
     ahead = None if holds else _by_forecasts_and_forces(context, chosen.fit, watcher)
     return ahead or _by_innovations(context, search, chosen, watcher)
 
 
-def _reread(context: Context, search: RobotSearch, fit: Fit) -> tuple[Context, RobotSearch]:
-    """The means with rows read the likelier way beside a fit (`Context.reread`), and a search by them."""
-    likelier = context.reread(fit)
-    if likelier is context:
-        return context, search
-    nominal = likelier.by_row.first_fit(search.nominal.hypothesis, search.nominal.levels)
-    return likelier, RobotSearch.of(FitStore.of(likelier.by_row, likelier.setting, nominal), nominal, likelier.held_out)
+def _means_read(context: Context, fit: Fit) -> Context | None:
+    """The means with rows that have means of commands, if nobody knows and every recording is likelier so."""
+    if context.rate_is_known or context.data.has_means:
+        return None
+    means = context.read_otherwise()
+    again = means.by_row.first_fit(fit.hypothesis, fit.levels)
+    return means if means.is_likelier(again, context, fit) else None
+
+
+def _reread(context: Context, search: RobotSearch, chosen: Chosen) -> tuple[Context, RobotSearch, Chosen]:
+    """What a search has come to, read the likelier way.
+
+    What a model lacks may look like a slow log. So rows that were taken for means are read as held again, and the
+    search may find one effect more of every part.
+    """
+    if not context.rate_is_known and context.data.has_means:
+        held = context.read_otherwise()
+        again = _search_by(held, search.nominal)
+        grown = again.grown(again.fit_from(chosen.fit), steps=1)
+        if held.is_likelier(grown.fit, context, chosen.fit):
+            return held, again, again.run(grown.fit).after(chosen.considered + grown.considered)
+        return context, search, chosen
+    means = _means_read(context, chosen.fit)
+    if means is None:
+        return context, search, chosen
+    again = _search_by(means, search.nominal)
+    return means, again, again.run(again.fit_from(chosen.fit)).after(chosen.considered)
+
+
+def _search_by(context: Context, nominal: Fit) -> RobotSearch:
+    """A search by the innovations of rows as they are read, from the nominal model as another reading has it on."""
+    first = context.by_row.first_fit(nominal.hypothesis, nominal.levels)
+    return RobotSearch.of(FitStore.of(context.by_row, context.setting, first), first, context.held_out)
 
 
 def _by_innovations(context: Context, search: Search, chosen: Chosen, watcher: Watcher) -> Found:
