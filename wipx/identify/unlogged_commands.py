@@ -5,7 +5,14 @@ import numpy as np
 from wipx.core.model import Model
 from wipx.core.recording import Recording
 from wipx.identify.linearisation import answers_to_commands
-from wipx.sim.inputs import Inputs, white_noise
+from wipx.sim.inputs import Inputs
+
+
+def noise_of_means(recording: Recording, command: str) -> float:
+    """Standard deviation of white noise of a logged command, read off fourth differences [N or N m]; else zero."""
+    if len(recording) < 5:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(recording[command], 4)))) / np.sqrt(70.0)
 
 
 def jolts(model: Model, recordings: tuple[Recording, ...], inputs: Inputs, coordinates: np.ndarray) -> np.ndarray:
@@ -31,7 +38,7 @@ def jolts(model: Model, recordings: tuple[Recording, ...], inputs: Inputs, coord
         return found
     slopes = answers_to_commands(model, inputs, coordinates)
     for r, recording in enumerate(recordings):
-        noise = np.array([white_noise(recording[name]) for name in model.plant.commands])
+        noise = np.array([noise_of_means(recording, name) for name in model.plant.commands])
         steps, missing = np.diff(recording.t), recording.missing
         gaps = steps * missing / (1.0 + missing)
         slope = slopes[: len(steps), r]

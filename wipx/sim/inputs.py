@@ -94,22 +94,13 @@ class Inputs:
         return Inputs(self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last), ramps)
 
 
-def white_noise(values: np.ndarray) -> float:
-    """Standard deviation of white noise of a signal, shape (rows,), read off fourth differences; zero of a few rows."""
-    return 1.4826 * float(np.median(np.abs(np.diff(values, 4)))) / np.sqrt(70.0) if len(values) > 4 else 0.0
-
-
 def _ramps(t: np.ndarray, commands: np.ndarray, periods: int) -> np.ndarray:
     """Change of the command along each row, shape (rows - 1, inputs).
 
-    A staircase of n equal steps over a row has the first moment of a ramp 1 - 1/n^2 as high. White noise of the means
-    tells nothing of a slope within a row: slopes count by the share of their variance that is not its.
+    A staircase of n equal steps over a row has the first moment of a ramp 1 - 1/n^2 as high.
     """
     interval = np.diff(t)
     held = commands[:-1]
-    if len(held) < 2:
-        return np.zeros_like(held)
-    changes = np.gradient(held, t[:-1] + 0.5 * interval, axis=0) * interval[:, None]
-    noise = 0.5 * np.array([white_noise(column) for column in held.T]) ** 2
-    smooth = np.clip(1.0 - noise / np.maximum(np.mean(changes**2, axis=0), 1e-300), 0.0, 1.0)
-    return (1.0 - 1.0 / periods**2) * smooth * changes
+    middle = t[:-1] + 0.5 * interval
+    slopes = np.gradient(held, middle, axis=0) if len(held) > 1 else np.zeros_like(held)
+    return (1.0 - 1.0 / periods**2) * slopes * interval[:, None]

@@ -8,6 +8,7 @@ import pytest
 from diagnosis.recorded import SIMULATOR, Bench, bench, coloured, thinned
 from diagnosis.recorded_arm import arm, recorded
 from identify.emulated_robot import nominal_model
+from scipy.signal import lfilter
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
@@ -73,11 +74,12 @@ def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(loud: str, quiet: 
 
 
 def shaken_pendulums(rng: np.random.Generator, unknown: tuple[float, ...]) -> list[Recording]:
-    """Runs of a double pendulum under white commands, and under as white torques of some sizes that no log has."""
+    """Runs of a double pendulum under noisy commands, and under white torques of some sizes that no log has."""
     t, nominal, hanging = np.arange(0.0, 8.0, 0.004), nominal_model("double_pendulum"), np.array([np.pi, 0.0, 0.0, 0.0])
     recordings = []
     for number, size in enumerate(unknown):
-        u = 0.2 * np.sin(2.0 * np.pi * np.outer(t, rng.uniform(0.5, 1.5, 2))) + rng.normal(0.0, 0.3, (len(t), 2))
+        u = 0.2 * np.sin(2.0 * np.pi * np.outer(t, rng.uniform(0.5, 1.5, 2)))
+        u += lfilter([0.5], [1.0, -0.5], rng.normal(0.0, 0.3, (len(t), 2)), axis=0)
         inputs = Inputs.of([t], [u + rng.normal(0.0, 1.0, (len(t), 2)) * size], [0])
         run = SIMULATOR.replay(ModelBatch(nominal), inputs, hanging[:, None, None])
         q = run.coordinates[:, :, 0, 0] + rng.normal(0.0, 1e-6, (len(t), 2))

@@ -7,7 +7,8 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.sim.inputs import Inputs, white_noise
+from wipx.identify.unlogged_commands import noise_of_means
+from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
 ECHO = 1e-3  # of a reported force's variation, that must be more than a repeated command
@@ -113,7 +114,7 @@ class RecordingBatch:
         """
         found = []
         for name in self.plant.commands:
-            scaled = [np.sqrt(r.periods - 1) * white_noise(r[name]) for r in self.recordings]
+            scaled = [np.sqrt(r.periods - 1) * noise_of_means(r, name) for r in self.recordings]
             found.append(np.sqrt(6.0) * float(np.median(scaled)))
         return np.array(found)
 
