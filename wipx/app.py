@@ -67,7 +67,10 @@ def main() -> int:
             _run_reported(config, out)
 
     if sys.argv[1:] in (["--help"], ["-h"]):
-        print(help_text())
+        try:
+            print(help_text(), flush=True)
+        except BrokenPipeError:  # nobody reads on
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
     try:
         arguments = unambiguous(spelled_out(renamed(sys.argv[1:])))
