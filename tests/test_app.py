@@ -11,7 +11,7 @@ import yaml
 from stub_task import StubTask
 from tasks.conftest import Answer, program_in
 
-from wipx.app import configuration_folder, explanation
+from wipx.app import configuration_folder, explanation, help_text
 from wipx.renamed import renamed
 
 SLOW_PACKAGES = {"torch", "mlflow", "pybullet", "numba", "scipy", "matplotlib", "plotly", "pandas"}
@@ -201,6 +201,10 @@ def test_the_status_of_the_process_is_that_of_the_run(tmp_path: Path):
     answer = in_a_process(tmp_path, "-m", "wipx", "sed=1")
     assert (answer.status, answer.out) == (2, "")
     assert answer.error.startswith("configuration: unknown key 'sed'; did you mean seed?")
+
+
+def test_help_is_that_of_hydra(tmp_path: Path):
+    assert in_a_process(tmp_path, "-m", "wipx", "--help", "seed=0").out == f"{help_text()}\n"
 
 
 def test_help_lists_the_groups_and_shows_one_example_of_each_use(command_line: CommandLine):

@@ -21,7 +21,7 @@ def jolts(model: Model, recordings: tuple[Recording, ...], inputs: Inputs, coord
     The log has the mean of N white commands of a row, each of variance v, and with it how far they move the rate. Their
     first moment moves the coordinate besides; over a row of length T its variance is v T^4 (1 - 1/N^2) / (12 N).
     Where rows are missing, the command is taken as held. It then differs from the true one by about as much as it has
-    changed behind the gap, and by its noise.
+    changed across the gap, and by its noise.
 
     Args:
         model: Whose body is moved.

@@ -72,7 +72,7 @@ def test_innovations_of_a_wrong_model_are_not(fresh_seed: int):
     assert correlation(series, 1) > 10.0 / np.sqrt(len(series))
 
 
-def test_innovations_behind_missing_rows_are_no_larger_than_others(fresh_seed: int):
+def test_innovations_after_missing_rows_are_no_larger_than_others(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     t = DT * np.arange(3000)
     command = 5.0 * np.sin(3.0 * t) + rng.normal(size=len(t))
@@ -88,6 +88,32 @@ def test_innovations_behind_missing_rows_are_no_larger_than_others(fresh_seed: i
     behind = np.flatnonzero(recording.missing) + 1
     for later in range(3):
         assert np.mean(shown[0, 0, 0, behind[1:-1] + later] ** 2) < 2.0
+
+
+def test_reports_after_missing_rows_do_not_count(fresh_seed: int):
+    """They answer to commands that are not in the log."""
+    rng = np.random.default_rng(fresh_seed)
+    t = DT * np.arange(2000)
+    command = rng.normal(size=len(t))
+    model = unit_axis({})
+    run = SIMULATOR.replay(ModelBatch(model), Inputs.of([t], [command[:, None]], [0]), np.zeros((2, 1, 1)))
+    late = np.concatenate([[0.0], command[:-1]]) + 0.01 * rng.normal(size=len(t))
+    columns = {
+        "t": t,
+        "x": run.coordinates[:, 0, 0, 0] + 1e-6 * rng.normal(size=len(t)),
+        "u": command,
+        "u_measured": late,
+    }
+    kept = np.arange(len(t)) % 40 != 20
+    recording = Recording("r1.csv", {name: values[kept] for name, values in columns.items()})
+    case = Bench(model, (recording,), {})
+    follower = case.fitter.innovations_model
+    gains = follower.gains(NoiseLevels(np.array([1e-3]), np.array([1e-6])), model)
+    reports = follower.innovations(ModelBatch(model), (gains,), np.zeros(1, int), np.zeros(1))[0, 0, 1]
+    after = np.flatnonzero(recording.missing)[:, None] + 1 + np.arange(3)
+    assert np.any(reports)
+    assert not np.any(reports[after])
+    assert np.abs(reports[:-1]).max() < 10.0 * np.median(np.abs(reports[:-1]))
 
 
 def test_noise_levels_come_back(fresh_seed: int):

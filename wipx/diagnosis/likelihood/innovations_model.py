@@ -118,7 +118,7 @@ class InnovationsModel:
 
     @cached_property
     def _untold(self) -> list[tuple[int, int]]:
-        """Recording and first row behind each gap: what the drives report there answers to commands of the gap."""
+        """Recording and first row after each gap: what the drives report there answers to commands of the gap."""
         gaps = [(r, np.flatnonzero(recording.missing)) for r, recording in enumerate(self.data.recordings)]
         return [(r, int(k) + 1) for r, rows in gaps for k in rows]
 
