@@ -38,3 +38,13 @@ def test_a_program_that_finds_nothing_compiled_says_so_once(
         wipx.compilation.compile_simulator()
     assert calls == [first_use.FILTERS]
     assert capfd.readouterr().err.count("compiling the simulator") == 1
+
+
+def test_a_program_that_may_start_no_other_one_compiles_by_itself(monkeypatch: pytest.MonkeyPatch):
+    def refused(command: tuple[str, ...], **_: object) -> None:
+        raise PermissionError(command)
+
+    monkeypatch.setattr(first_use, "is_kept", lambda kernel: False)
+    monkeypatch.setattr(subprocess, "Popen", refused)
+    first_use.compile_filters_meanwhile.cache_clear()
+    wipx.compilation.compile_simulator()

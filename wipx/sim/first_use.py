@@ -5,6 +5,7 @@ That is said, and the filters along recordings are compiled meanwhile in a proce
 
 import subprocess
 import sys
+from contextlib import suppress
 from functools import cache
 
 from wipx.sim.cache import is_kept
@@ -19,4 +20,7 @@ def compile_filters_meanwhile() -> None:
     """Say that code must be compiled, and have the filters compiled, if the simulator is about to be; once."""
     if not is_kept(rollout):
         print("compiling the simulator and the filters, once; this takes up to a minute", file=sys.stderr)
-        begun.append(subprocess.Popen(FILTERS, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+        with suppress(
+            OSError
+        ):  # where no process may be started, filters are compiled one by one, when they are needed
+            begun.append(subprocess.Popen(FILTERS, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))

@@ -1,14 +1,16 @@
 """How much a drive gives at most is found wherever the limit is, also where commands are no forces."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench
+from diagnosis.recorded_arm import arm, recorded
 
 from wipx.core.recording import Recording
 from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
-from wipx.diagnosis.candidates.screening import basis_of
+from wipx.diagnosis.candidates.screening import basis_of, candidates_of_effect
 
 GAIN = 12.5  # N per unit of a command without unit
 
@@ -54,3 +56,16 @@ def guesses(scan, effect: str, case: Bench, answer: float = 1.0) -> np.ndarray:
     """What a scan makes of what the nominal model leaves, or of a share of it."""
     fit = case.fit()
     return scan(case.fitter, replace(fit, white=answer * fit.white), basis_of(fit), effect)
+
+
+def test_a_limit_of_few_rows_is_found_where_a_joint_is_quiet(tmp_path: Path, fresh_seed: int):
+    """The errors of the joint are white, but for the instants in which its drive gives less than it is asked for."""
+    model = arm(tmp_path)
+    asked = np.abs(recorded(model, fresh_seed)["u_elbow"])
+    limit = {"F_max": float(np.quantile(asked, 0.997))}
+    rows = recorded(model.with_effects({"actuator_elbow/saturation": limit}), fresh_seed)
+    case = Bench(model, (rows,), {})
+    found = candidates_of_effect(case.fitter, case.setting, case.fit(), "actuator_elbow/saturation")
+    best = max(found, key=lambda candidate: candidate.gain)
+    assert best.gain > 10.0
+    assert best.values["actuator_elbow/saturation.F_max"] == pytest.approx(limit["F_max"], rel=0.15)

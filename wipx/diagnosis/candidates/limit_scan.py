@@ -4,6 +4,9 @@ What a limit takes away is no more proportional to it than where it sets in. The
 missing under each of many limits is enough to compare them all; the screening then simulates the best ones. Beside dry
 friction the linear response is only roughly right, and its whole size may cost more than it explains. So the limits
 whose response goes best with what is left, whatever its size, are simulated too.
+
+A limit that acts in many rows colours the errors of its joint. Where they are white, only those that act in few rows
+are compared.
 """
 
 import numpy as np
@@ -17,12 +20,15 @@ from wipx.diagnosis.likelihood.innovations import InnovationFitter
 GUESSES = 6
 BY_COURSE = 3  # more, by the course of the response
 TOGETHER = 24  # limits whose responses are kept at once; bounds the memory
-LIMITS = np.geomspace(0.05, 1.5, 36)  # of the largest command
+SHARES = np.concatenate([np.geomspace(1e-3, 0.1, 12), np.linspace(0.14, 0.98, 22)])  # of the rows, in which one acts
 SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of the largest speed
+RARE = 0.01  # share of the rows in which a limit acts that colours no errors
 SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 
-def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
+def saturations(
+    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, *, rare: bool = False
+) -> np.ndarray:
     """Likely largest forces [N or N m], best first, shape (up to GUESSES + BY_COURSE, 1).
 
     Args:
@@ -30,11 +36,14 @@ def saturations(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: s
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
         effect: Its name "site/saturation".
+        rare: Whether to look only at those that act in few rows.
     """
-    return _likely(fitter, fit, basis, effect, np.array([np.inf]))[:, :1]
+    return _likely(fitter, fit, basis, effect, np.array([np.inf]), rare)[:, :1]
 
 
-def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
+def speed_limits(
+    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, *, rare: bool = False
+) -> np.ndarray:
     """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES + BY_COURSE, 2).
 
     Args:
@@ -42,11 +51,14 @@ def speed_limits(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: 
         fit: What is already explained.
         basis: What its numbers can imitate, orthonormal, shape (N, D).
         effect: Its name "site/speed_limit".
+        rare: Whether to look only at those that act in few rows.
     """
-    return _likely(fitter, fit, basis, effect, SPEEDS)
+    return _likely(fitter, fit, basis, effect, SPEEDS, rare)
 
 
-def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, speeds: np.ndarray) -> np.ndarray:
+def _likely(
+    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, speeds: np.ndarray, rare: bool
+) -> np.ndarray:
     data = fitter.data
     plant = data.plant
     motion = motion_of(fitter, fit)
@@ -54,9 +66,14 @@ def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, 
     joints = [plant.joints.index(joint) for joint in driven]
     forces = [np.where(data.rows, drive_force(fit.hypothesis.model, motion, joint), 0.0) for joint in driven]
     rates = [motion[plant.rates[joint]] for joint in joints]
-    largest = max(float(np.abs(force).max()) for force in forces)
     fastest = max(1e-9, *(float(np.quantile(np.abs(rate[data.counted]), FAST)) for rate in rates))
-    pairs = np.array([(limit * largest, speed * fastest) for speed in speeds for limit in LIMITS])
+    shares = SHARES[SHARES <= RARE] if rare else SHARES
+    pairs = []
+    for free in speeds * fastest:
+        most = np.max([asked(force, rate, free) for force, rate in zip(forces, rates, strict=True)], axis=0)
+        stalls = np.unique(np.quantile(most[data.rows], 1.0 - shares, method="lower"))
+        pairs += [(stall, free) for stall in stalls if 0.0 < stall < np.inf]
+    pairs = np.array(pairs).reshape(-1, 2)
     left = left_of(fit, basis)
     slopes, sizes = np.zeros(len(pairs)), np.zeros(len(pairs))
     for begin in range(0, len(pairs), TOGETHER):
@@ -76,6 +93,13 @@ def _likely(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, 
         return (ratio <= SAME_LIMIT) & (free == free[i])
 
     return pairs[list(dict.fromkeys([*peaks(whole, GUESSES, same), *peaks(course, BY_COURSE, same)]))]
+
+
+def asked(force: np.ndarray, rate: np.ndarray, free: float) -> np.ndarray:
+    """The stall force below which a limit takes from a force; infinite where a drive is too fast to give any."""
+    driving = force * rate > 0.0
+    share = np.where(driving, np.maximum(1.0 - np.abs(rate) / free, 0.0), 1.0)
+    return np.divide(np.abs(force), share, out=np.full_like(force, np.inf), where=share > 0.0)
 
 
 def limited(force: np.ndarray, rate: np.ndarray, stall: np.ndarray, free: np.ndarray) -> np.ndarray:

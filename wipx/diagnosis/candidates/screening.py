@@ -6,6 +6,7 @@ freed of what the numbers already in the model can imitate, is compared with the
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -38,7 +39,11 @@ SCANS: dict[str, Scan] = {
     "springs": springs,
     "point_masses": point_masses,
 }  # first guesses that take more than a grid, by `Effect.scan`
-LOUD = (saturations, speed_limits, plays, springs)  # of effects whose lack a joint shows plainly
+LOUD = (plays, springs)  # of effects whose lack a joint shows plainly
+RARE: dict[Scan | None, Scan] = {
+    saturations: partial(saturations, rare=True),
+    speed_limits: partial(speed_limits, rare=True),
+}  # of effects whose lack a joint shows plainly unless they act in few rows
 
 
 @dataclass(frozen=True)
@@ -134,8 +139,14 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     if effect.superposes:
         return [_regressed(fitter, setting, fit, name, basis, left)]
     scan = SCANS[effect.scan] if effect.scan else None
-    if scan in LOUD and setting.nominal.plant.tree is not None and _is_quiet(fitter, setting, fit, name):
-        return []
+    if (
+        (scan in LOUD or scan in RARE)
+        and setting.nominal.plant.tree is not None
+        and _is_quiet(fitter, setting, fit, name)
+    ):
+        if scan in LOUD:
+            return []
+        scan = RARE[scan]
     atoms = (
         perturbations(effect, setting.scales[name.partition("/")[0]])
         if scan is None
