@@ -17,8 +17,9 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
+from wipx.diagnosis.next_experiment.envelope import MORE_FORCE, MORE_TRAVEL
 from wipx.diagnosis.next_experiment.excitations import DURATION, Reach, excitations_for
-from wipx.diagnosis.next_experiment.simulated_experiment import FURTHER, STRONGER, Bench
+from wipx.diagnosis.next_experiment.simulated_experiment import Bench
 from wipx.identify.noise import sensor_noise
 from wipx.identify.parameter_space import scales_of
 from wipx.sim.analytic import AnalyticSimulator
@@ -172,8 +173,8 @@ def test_experiments_stay_within_reach(kind: str, fresh_seed: int):
     assert trials
     for trial in trials:
         travel = np.ptp(trial.recording.stack(case.nominal.plant.coordinates), axis=0)
-        assert np.all(travel <= FURTHER * reach.travel)
-        assert largest(trial.recording) <= STRONGER * reach.command
+        assert np.all(travel <= MORE_TRAVEL * reach.travel)
+        assert largest(trial.recording) <= MORE_FORCE * reach.command
 
 
 def test_steps_take_the_command_where_it_is_aimed():

@@ -22,7 +22,7 @@ from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.next_experiment.choice import Question, next_experiment
-from wipx.diagnosis.next_experiment.envelope import FURTHER, Envelope
+from wipx.diagnosis.next_experiment.envelope import MORE_TRAVEL, Envelope
 from wipx.diagnosis.next_experiment.excitations import DURATION
 from wipx.diagnosis.next_experiment.tree_excitations import motions_of
 from wipx.diagnosis.next_experiment.tree_experiment import TreeBench, pd_gains
@@ -135,7 +135,7 @@ def test_the_narrowest_limit_counts():
     assert envelope.speed[1] == 0.2
     assert envelope.force[1] == 0.4
     shown = data.recordings[0]["shoulder"]
-    assert envelope.high[0] - envelope.low[0] == pytest.approx(FURTHER * np.ptp(shown))
+    assert envelope.high[0] - envelope.low[0] == pytest.approx(MORE_TRAVEL * np.ptp(shown))
     assert not envelope.holds(np.array([[0.0, -0.2]]), np.zeros((1, 2)), np.zeros((1, 2)))
     assert envelope.holds(np.array([[0.0, 0.2]]), np.zeros((1, 2)), np.zeros((1, 2)))
 

@@ -9,8 +9,8 @@ from wipx.core.limits import JointLimits
 from wipx.core.plant import Plant
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 
-FURTHER = 2.0  # times the recorded travel and speed that an experiment may take
-STRONGER = 1.4  # times the largest recorded force
+MORE_TRAVEL = 2.0  # times the recorded travel and speed that an experiment may take
+MORE_FORCE = 1.4  # times the largest recorded force or command
 ACROSS = 0.05  # [s] over which recorded speeds are taken, so that noise does not count
 
 
@@ -59,15 +59,15 @@ class Envelope:
         efforts = dict(zip(plant.joints, _or_none(limits.force for limits in known), strict=True))
         drives = _or_none(plant.drives[joint].limit for joint in plant.actuated)
         half = 0.5 * (highest - lowest)
-        low = np.maximum(lows, lowest - (FURTHER - 1.0) * half)
-        high = np.minimum(highs, highest + (FURTHER - 1.0) * half)
+        low = np.maximum(lows, lowest - (MORE_TRAVEL - 1.0) * half)
+        high = np.minimum(highs, highest + (MORE_TRAVEL - 1.0) * half)
         fastest = np.max([np.abs(v).max(axis=0) for v in rates], axis=0)
         strongest = np.max([np.abs(force).max(axis=0) for force in asked], axis=0)
         return cls(
             low,
             high,
-            np.minimum(speeds, FURTHER * fastest),
-            np.minimum(np.minimum(drives, [efforts[joint] for joint in plant.actuated]), STRONGER * strongest),
+            np.minimum(speeds, MORE_TRAVEL * fastest),
+            np.minimum(np.minimum(drives, [efforts[joint] for joint in plant.actuated]), MORE_FORCE * strongest),
             np.clip(0.5 * (lowest + highest), low, high),
             np.minimum(half, 0.5 * (high - low)),
         )

@@ -10,6 +10,7 @@ from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
+from wipx.diagnosis.next_experiment.envelope import MORE_FORCE, MORE_TRAVEL
 from wipx.diagnosis.next_experiment.excitations import (
     DURATION,
     Excitation,
@@ -24,8 +25,6 @@ from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
 from wipx.sim.simulator import Rollouts, StateFeedback
 
-FURTHER = 2.0  # times the recorded travel that an experiment may take
-STRONGER = 1.4  # times the largest recorded command
 HALVINGS = 3
 AIMED = 3  # simulations that a size may take to reach a command
 EVENT = "geometry/payload_event"
@@ -117,7 +116,7 @@ class Bench:
 
     def _within_reach(self, recording: Recording, command: float) -> bool:
         travel = np.ptp(recording.stack(self.model.plant.coordinates), axis=0)
-        return bool(np.all(travel <= FURTHER * self.reach.travel) and command <= STRONGER * self.reach.command)
+        return bool(np.all(travel <= MORE_TRAVEL * self.reach.travel) and command <= MORE_FORCE * self.reach.command)
 
     @property
     def _rate(self) -> float:
