@@ -11,6 +11,7 @@ from wipx.core.errors import InputError
 from wipx.sweep import check_launcher
 
 
+@pytest.mark.slow
 def test_a_sweep_tells_how_far_it_is_and_can_be_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):

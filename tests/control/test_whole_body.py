@@ -44,6 +44,7 @@ def accelerations(model, positions, commands, lean=0.0):
     return (run.rates[1] - run.rates[0])[:, 0, 0] / 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass", [0.0, 1.5])
 def test_nothing_accelerates_at_the_balance(humanoid, mass: float):
     model = HAND.loaded(humanoid, mass)

@@ -10,6 +10,7 @@ from wipx.sim import first_use
 from wipx.sim.cache import AHEAD
 
 
+@pytest.mark.slow
 def test_filters_are_compiled_ahead_for_the_arrays_of_a_diagnosis(fresh_seed: int):
     before = {kernel: set(kernel.signatures) for kernel, _ in AHEAD}
     recordings = recorded("double_pendulum", {"joint1/coulomb": {"F_c": 0.2}}, seed=fresh_seed)

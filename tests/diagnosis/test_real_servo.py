@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 from recordings.test_datasets import source_of
 
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
@@ -9,6 +10,7 @@ from wipx.diagnosis.rules import USUAL
 from wipx.sim.analytic import AnalyticSimulator
 
 
+@pytest.mark.slow
 def test_what_errs_far_more_than_noise_is_not_consistent():
     source = replace(source_of("bam_xl330"), files=["xl330_*_lift_and_drop.csv"])
     robot = source.describe()

@@ -24,6 +24,7 @@ def run_code(text: str) -> dict[str, Any]:
     return told
 
 
+@pytest.mark.slow
 def test_tutorial_finds_the_friction_that_it_hides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     told = run_code(PAGE.read_text())

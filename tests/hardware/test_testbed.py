@@ -73,6 +73,7 @@ def heavy() -> Recording:
     return record(BED, Trial("b3_1.csv", 1.25, "b3"))[0]
 
 
+@pytest.mark.slow
 def test_recordings_have_the_columns_of_the_contract(heavy: Recording):
     assert heavy.name == "b3_1.csv"
     assert tuple(heavy.columns) == COLUMNS
@@ -148,6 +149,7 @@ def test_eight_classes_of_two_weights_cover_the_five_pitches():
     assert {round(load.equilibrium(BED.nominal()), 3) for load in loads.values()} == set(PITCHES)
 
 
+@pytest.mark.slow
 def test_forty_trials_of_80_samples_are_whole():
     # The paper's window is 1.2 s; under its LQR no load reaches the end of the rail before.
     runs = record(BED, *(Trial(name, 1.25, name) for name in BED.loads))

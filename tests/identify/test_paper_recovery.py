@@ -28,6 +28,7 @@ def values_of(problem: ClosedLoopProblem, model: Model) -> np.ndarray:
     return np.array([model.value(name) for name in problem.space.names])
 
 
+@pytest.mark.slow
 @pytest.mark.statistical(allowed=0.02)
 def test_all_twelve_numbers_come_back_within_their_intervals(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from wipx.report.estimation_tables import METHODS_HEAD
 from wipx.report.printed import comparison, printed_figures
 from wipx.report.table import Table, tables_in
@@ -30,6 +32,7 @@ def test_the_papers_figures_stand_beside_ours_each_with_a_reason():
     assert sum(one.place == "Table II" for one in printed_figures()) == 5 * 4 * 2 + 5
 
 
+@pytest.mark.slow
 def test_the_page_has_every_part_and_says_what_could_not_be_made(tmp_path: Path):
     (tmp_path / "methods").mkdir()
     (tmp_path / "methods" / "table.md").write_text(markdown(METHODS_HEAD, ROWS, (4,)))

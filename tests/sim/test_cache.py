@@ -3,6 +3,8 @@
 import shutil
 from pathlib import Path
 
+import pytest
+
 from wipx.sim.cache import PACKAGE, sources_digest
 
 MADE_UP = {
@@ -52,6 +54,7 @@ def test_compiled_functions_and_all_they_use_ask_for_compilation(tmp_path: Path)
     assert [source for source in MADE_UP if not changes(tmp_path, source)] == ["c/report.py"]
 
 
+@pytest.mark.slow
 def test_an_edit_of_the_package_asks_for_compilation_where_compiled_code_needs_it(tmp_path: Path):
     package = Path(shutil.copytree(PACKAGE, tmp_path / "wipx", ignore=shutil.ignore_patterns("__pycache__", "conf")))
     assert not changes(package, "report/page.py")

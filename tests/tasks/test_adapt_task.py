@@ -44,6 +44,7 @@ def test_an_adapted_simulation_is_closer_to_the_robot_also_with_loads_it_never_s
         assert (tmp_path / "after" / name).is_file()
 
 
+@pytest.mark.slow
 def test_a_finished_job_is_not_repeated_and_one_with_other_settings_is_refused(program: Program, tmp_path: Path):
     first = program("task=adapt", "method=pure_sim", *ROBOT, "hydra.run.dir=job")
     assert first.status == 0, first.error

@@ -225,6 +225,7 @@ def test_tables_pictures_and_film_come_from_a_finished_sweep(program: Program, t
     assert "1 of 3 jobs have no result" in again.error
 
 
+@pytest.mark.slow
 def test_one_controller_runs_from_the_command_line_and_is_not_run_twice(program: Program, tmp_path: Path):
     arguments = (
         "task=control",

@@ -23,6 +23,7 @@ def test_an_example_is_a_whole_robot(name: str):
     assert all(link.limits is not None and link.effort is not None for link in plant.tree.links)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW)
 def test_an_example_is_recorded_within_its_limits_and_lacks_physics(program, name: str, tmp_path: Path):
     made = program("task=example", f"task.robot={name}", "task.path=robot", "task.runs=1", "task.duration=4")

@@ -16,6 +16,7 @@ FAST = ("task=identify", "optimizer.starts=1", "objective.horizon=0.3")
 RESULTS = {"config.yaml", "fit.png", "metrics.json", "model.yaml", "report.html", "search.csv"}
 
 
+@pytest.mark.slow
 def test_a_pendulum_is_completed_and_its_model_predicts(program, examples: Path, tmp_path: Path):
     pendulum = examples / "pendulum"
     answer = program(*FAST, f"recordings.path={pendulum / 'visible'}", "hydra.run.dir=out")

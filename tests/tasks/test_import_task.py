@@ -31,6 +31,7 @@ def test_a_preview_writes_no_recordings(program, tmp_path: Path):
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["config.yaml", "import.json", "import.png"]
 
 
+@pytest.mark.slow
 def test_a_written_set_is_read_by_the_other_tasks(program, folder, tmp_path: Path):
     t = np.arange(400) * 0.01
     theta = np.pi + 0.2 * np.cos(4.2 * t)

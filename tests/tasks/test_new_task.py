@@ -24,6 +24,7 @@ def files(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_folder_is_set_up_once_and_read_by_other_tasks(program, files: Path):
     command = ("task=new", "path=new robot", "model=arm.xml", "log=run 1.csv", "hydra.run.dir=out")
     answer = program(*command)

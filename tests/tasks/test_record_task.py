@@ -74,6 +74,7 @@ def test_a_recording_that_is_too_short_to_be_diagnosed_is_left_out_and_told(prog
     assert "left out" in answer.out
 
 
+@pytest.mark.slow
 def test_the_proposed_experiment_is_recorded_and_both_sets_are_one_override(program, tmp_path: Path):
     folder = experiment(tmp_path / "answer")
     answer = program("task=record", *QUICK, f"task.experiment={folder}", "hydra.run.dir=new")

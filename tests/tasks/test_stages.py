@@ -33,6 +33,7 @@ def test_a_stage_leaves_its_results_its_command_and_its_words(chain: Chain, said
     assert said[-1] == ("", 0.5)
 
 
+@pytest.mark.slow
 def test_a_finished_stage_is_not_repeated_and_one_of_another_command_is_refused(chain: Chain):
     chain.run(figure())
     written = (chain.out / "figure" / "friction.csv").stat().st_mtime_ns

@@ -27,6 +27,7 @@ def test_a_sticky_spot_is_put_on_the_rail(fresh_seed: int):
     assert 0.5 < region.share <= 1.0
 
 
+@pytest.mark.slow
 def test_an_event_is_put_in_time(fresh_seed: int):
     hidden = {"geometry/payload_event": {"mass": 0.3, "height": 0.3, "t0": 1.5}}
     answer = bench("wip", hidden, fresh_seed).diagnosed()

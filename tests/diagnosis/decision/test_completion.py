@@ -49,6 +49,7 @@ def test_what_is_smaller_than_the_rest_is_not_named(monkeypatch: pytest.MonkeyPa
     assert dominant(search, more).fit is more  # recorded forces show it as well
 
 
+@pytest.mark.slow
 def test_what_one_recording_has_of_its_own_is_no_law_of_the_machine(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
     first, *others = case.recordings

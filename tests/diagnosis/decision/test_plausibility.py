@@ -93,6 +93,7 @@ def test_examples_are_plausible(name: str, examples: Path):
     checked(*example(examples / name), EXAMPLES[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("undone", SLIPS_OF["wip"])
 def test_mistakes_in_the_log_of_a_wip_are_named(undone: str, fresh_seed: int):
     model = nominal_model("wip")
@@ -114,7 +115,7 @@ def test_mistakes_in_the_log_of_a_pendulum_are_named(undone: str, fresh_seed: in
 
 
 @pytest.mark.parametrize("mistake", BAD_UNITS, ids=lambda mistake: mistake.undone)
-@pytest.mark.parametrize("kind", ["wip", "pendulum"])
+@pytest.mark.parametrize("kind", [pytest.param("wip", marks=pytest.mark.slow), "pendulum"])
 def test_numbers_in_a_wrong_unit_are_named(kind: str, mistake: Mistake, fresh_seed: int):
     model = nominal_model(kind)
     recordings = Robot(model).record(np.random.default_rng(fresh_seed), 1)

@@ -64,6 +64,7 @@ def test_a_fit_without_a_gap_is_left_as_it_is():
     np.testing.assert_array_equal(alike(case.fitter, fit, 100.0), fit.hypothesis.cube[None])
 
 
+@pytest.mark.slow
 def test_a_delay_is_found_under_commands_that_change_with_every_row(fresh_seed: int):
     """White commands tell a delay sharply: a millisecond beside it, the likelihood has other peaks."""
     rng = np.random.default_rng(fresh_seed)

@@ -28,6 +28,7 @@ def test_the_first_guess_swings_about_as_the_true_drive_does(tmp_path: Path, fre
     assert np.sqrt(stiffness / inertia) == pytest.approx(ALONE, rel=0.3)
 
 
+@pytest.mark.slow
 def test_the_spring_is_named_with_its_numbers(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     case = Bench(model, (recorded(model.with_effects({SPRING: TRUE}), fresh_seed),), {})

@@ -71,6 +71,7 @@ def test_a_load_and_a_rotor_are_told_apart_beside_friction(
 SHIFT = {"link_lower/com_offset": {"x": 0.02, "y": 0.01, "z": 0.03}}
 
 
+@pytest.mark.slow
 def test_a_link_gets_the_law_of_its_mass_that_suits_it_while_friction_is_still_missing(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     case = Bench(model, (recorded(model.with_effects(SHIFT | FRICTION), fresh_seed),), {})

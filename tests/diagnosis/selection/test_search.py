@@ -1,5 +1,6 @@
 """A search returns what it chose and what it considered."""
 
+import pytest
 from diagnosis.recorded import Bench, bench
 
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
@@ -42,6 +43,7 @@ def test_a_second_run_of_a_search_says_the_same(fresh_seed: int):
     assert search.nominal is nominal
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(fresh_seed: int):
     case = bench("linear_axis", {**FRICTION, "actuator/dead_zone": {"band": 0.5}}, fresh_seed)
     robot = KnownRobot(case.nominal, {})

@@ -22,6 +22,8 @@ from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.shared.job import Job
 
+pytestmark = pytest.mark.slow  # robots are drawn and sealed
+
 CONSISTENT = {
     "schema": 1,
     "verdict": "consistent",

@@ -124,6 +124,7 @@ def comes_by(case: Case) -> bool:
     return any(((low <= run.exact["x"]) & (run.exact["x"] <= high)).any() for run in case.visible)
 
 
+@pytest.mark.slow
 def test_a_sticky_spot_is_where_the_robot_comes_by():
     # The first spot that is drawn here is out of reach, but the pitch joint sticks: rounding grows to a contrast.
     assert comes_by(draw_case(np.random.default_rng(143669840931853103283218231824315999576), "triple"))

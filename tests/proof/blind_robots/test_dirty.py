@@ -49,6 +49,7 @@ def has_the_share_that_was_asked_for(case: Case) -> bool:
     return SHARE[0] <= case.dirt["share"] <= SHARE[1] and case.dirt["scale"] <= LARGEST
 
 
+@pytest.mark.slow
 def test_the_dirt_has_the_share_that_was_asked_for(case: Case, dirt_only: Case):
     assert has_the_share_that_was_asked_for(case)
     assert has_the_share_that_was_asked_for(dirt_only)

@@ -52,6 +52,7 @@ def test_a_link_does_not_lead_around_the_rules(rules: Settings, tmp_path: Path):
         watch("open", (tmp_path / "way" / "keys.json", "r", 0))
 
 
+@pytest.mark.slow
 def test_the_program_cannot_read_the_recordings_of_another_case(tmp_path: Path):
     other = tmp_path / "run" / "recordings" / "case0002"
     other.mkdir(parents=True)
@@ -62,6 +63,7 @@ def test_the_program_cannot_read_the_recordings_of_another_case(tmp_path: Path):
     assert f"{REFUSED} {os.path.realpath(other)}" in noted
 
 
+@pytest.mark.slow
 def test_a_robot_from_a_model_file_starts_no_process(tmp_path: Path):
     robot = tmp_path / "robot"
     robot.mkdir()
