@@ -219,12 +219,12 @@ class RobotSearch(Search):
 
         Before, laws that need no longer be rich become simple, and those of links the ones that suit them best.
         """
-        if own.effects:
-            search = self._search_in(store, own)
-            own = search.with_better_links(search.preferred([own], store.nominal) or own)
         if not store.is_promising(own):
             return Chosen(own)
-        return self._search_in(store, own).grown(own, steps=1)
+        search = self._search_in(store, own)
+        if own.effects:
+            own = search.with_better_links(search.preferred([own], store.nominal) or own)
+        return search.grown(own, steps=1)
 
     def _exchanged_by_parts(self, whole: Fit) -> dict[frozenset[str], Chosen]:
         """What the parts that have effects become with better ones in their place."""
