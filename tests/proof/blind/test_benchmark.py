@@ -1,11 +1,13 @@
 """A whole run of the blind benchmark, with a quick stand-in for the diagnosis: from the seals to the check."""
 
 import json
+import os
 import shutil
 import stat
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from wipx.proof.blind.benchmark import BlindBenchmark
 from wipx.proof.blind.check import BlindCheck
 from wipx.proof.blind.diagnosing import OURS, Diagnosers, check_methods
 from wipx.proof.blind_robots.folder import RunFolder
+from wipx.proof.blind_robots.seal import Sealed
 from wipx.recordings.model_file import write_model
 from wipx.recordings.source import RecordingSource
 from wipx.tasks.shared.job import Job
@@ -221,6 +224,24 @@ def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path: Path):
     (tmp_path / "recordings").mkdir()
     with pytest.raises(InputError, match="holds recordings but no commitments"):
         TASK.run(job(tmp_path))
+
+
+def test_what_is_still_drawn_for_a_process_that_was_killed_does_not_mix_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    shown = benchmark._shown
+
+    def beside_another(begun: list[Future[Sealed]], words: str) -> Iterator[Sealed]:
+        yield from shown(begun, words)
+        (own,) = (tmp_path / "run").glob(f"{benchmark.DRAWING}*")
+        late = own.with_name(own.name.replace(str(os.getpid()), "1")) / "recordings" / "case0001" / "r9.csv"
+        late.parent.mkdir(parents=True, exist_ok=True)
+        late.write_text("t,x\n")
+
+    monkeypatch.setattr(benchmark, "_shown", beside_another)
+    monkeypatch.setattr(Diagnosers, "_watched", answered_nothing)
+    TASK.run(job(tmp_path / "run"))
+    check(RunFolder(tmp_path / "run"))
 
 
 def test_two_processes_do_not_work_on_one_run(tmp_path: Path):

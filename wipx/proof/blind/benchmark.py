@@ -37,7 +37,7 @@ from wipx.tasks.files.results import write_json
 from wipx.tasks.shared.job import Job
 
 EARLIER = "earlier"  # folder that takes finished runs
-DRAWING = ".drawing"  # folder of cases that are not all sealed yet
+DRAWING = ".drawing"  # begins the name of the folder of cases that are not all sealed yet
 RUNNING = "running.pid"
 SHORTEST, LONGEST = 4.0, 60.0  # [s], of recordings: in less the slow excitations hardly move a robot
 PARTS = ("recordings", "sealed", "answers", "opened")
@@ -170,8 +170,10 @@ class BlindBenchmark:
             raise InputError(
                 f"{folder.path}: holds {', '.join(unknown)} but no commitments.json; set another hydra.run.dir"
             )
-        draft = RunFolder(folder.path / DRAWING)
-        shutil.rmtree(draft.path, ignore_errors=True)  # of a run that was stopped before it was sealed
+        for stopped in folder.path.glob(f"{DRAWING}*"):  # before all was sealed
+            shutil.rmtree(stopped, ignore_errors=True)
+        # Of this process alone: what draws for a process that was killed may go on for a while.
+        draft = RunFolder(folder.path / f"{DRAWING}{os.getpid()}")
         seed = secrets.randbits(64) if self.seed is None else self.seed
         tiers = stratified(self.cases, self._compared, self.tiers or tuple(TIERS), np.random.default_rng(seed))
         names = [f"case{number:04d}" for number in range(1, self.cases + 1)]
