@@ -195,3 +195,8 @@ def test_limits_of_a_joint_are_the_users():
 def test_limits_belong_to_robots_from_model_files(tmp_path: Path):
     with pytest.raises(InputError, match="limits"):
         read_robot(robot_file(tmp_path, LOADED + "limits: {translation: {speed: 1.0}}\n"))
+
+
+def test_a_known_payload_may_hang_below_the_wheel_axis(tmp_path: Path):
+    text = WIP + "effects: {geometry/payload: {mass: 0.1, height: -0.05}}"
+    assert read_robot(robot_file(tmp_path, text)).model.effects["geometry/payload"]["height"] == -0.05

@@ -90,6 +90,7 @@ class Parameter:
         start: Where a search begins, likewise.
         grid: Values at which a diagnosis looks for the effect, likewise; empty for `start` alone.
         default: Value where a file gives none [SI]; None where it must give one.
+        signed: Whether a file may give a negative number, though a search looks for none.
     """
 
     name: str
@@ -101,6 +102,7 @@ class Parameter:
     start: float
     grid: tuple[float, ...] = ()
     default: float | None = None
+    signed: bool = False
 
     def unit(self, *, angular: bool) -> str:
         """The SI unit at a turning (`angular`) or a sliding joint."""

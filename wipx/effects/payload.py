@@ -9,7 +9,7 @@ EFFECT = Effect(
     sites=("geometry",),
     parameters=(
         Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05, grid=(0.05,)),
-        Parameter("height", "above the wheel axis", "length", 1.0, 0.0, 4.0, 1.0, grid=(0.3, 1.0, 2.0)),
+        Parameter("height", "above the wheel axis", "length", 1.0, 0.0, 4.0, 1.0, grid=(0.3, 1.0, 2.0), signed=True),
     ),
     law="m_b + m; L and I_b about the new centre of mass (parallel axes)",
     linear_in=("mass",),

@@ -16,7 +16,7 @@ EFFECT = Effect(
     sites=("geometry",),
     parameters=(
         Parameter("mass", "of the payload", "mass", 0.0, 0.0, 1.0, 0.05, grid=(0.05,)),
-        Parameter("height", "above the wheel axis", "length", 1.0, 0.0, 4.0, 1.0, grid=(0.5, 1.5)),
+        Parameter("height", "above the wheel axis", "length", 1.0, 0.0, 4.0, 1.0, grid=(0.5, 1.5), signed=True),
         Parameter(
             "t0", "when it comes", "moment", 0.0, 0.0, 1.0, 0.5, grid=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
         ),

@@ -173,7 +173,8 @@ def _effect_values(data: object, name: str, effect: Effect, where: str) -> dict[
             raise InputError(f"{where} lacks {symbol} ({parameter.meaning}); add it")
         value = _number(data, symbol, where)
         # A search interval that begins at zero or above belongs to a law for that sign alone.
-        if (parameter.low >= 0.0 and value < 0.0) or (parameter.low > 0.0 and value == 0.0):
+        negative = value < 0.0 and parameter.low >= 0.0 and not parameter.signed
+        if negative or (parameter.low > 0.0 and value == 0.0):
             sign = "positive" if parameter.low > 0.0 else "non-negative"
             raise InputError(f"{where}: {symbol} = {value:g}, expected a {sign} number ({parameter.meaning})")
         values[symbol] = value
