@@ -13,14 +13,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("d", "share of the force that is lost per second", "per_time", 0.0, -0.05, 0.05, 0.0),
         Parameter(
-            "l",
-            "share of the largest forces that is lost, and of the smallest gained",
-            "ratio",
-            0.0,
-            0.0,
-            0.8,
-            0.0,
-            signed=True,
+            "l", "share of the largest forces that is lost, and of the smallest gained", "ratio", 0.0, 0.0, 0.8, 0.0
         ),
         Parameter(
             "t_0", "time at which nothing is lost; half of that after which no more is", "moment", 0.0, 0.0, 1.0, 0.5

@@ -22,7 +22,7 @@ BY_COURSE = 3  # more, by the course of the response
 TOGETHER = 24  # limits whose responses are kept at once; bounds the memory
 SHARES = np.concatenate([np.geomspace(1e-3, 0.1, 12), np.linspace(0.14, 0.98, 22)])  # of the rows, in which one acts
 SPEEDS = np.array([0.7, 0.85, 1.05, 1.35, 1.8, 2.6, 4.5])  # without load, of the largest speed
-RARE = 0.01  # share of the rows in which a limit acts that colours no errors
+RARE = 0.01  # share of the rows, up to which a limit may act and leave errors white; judgement
 SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 

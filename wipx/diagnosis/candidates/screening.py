@@ -39,11 +39,12 @@ SCANS: dict[str, Scan] = {
     "springs": springs,
     "point_masses": point_masses,
 }  # first guesses that take more than a grid, by `Effect.scan`
-LOUD = (plays, springs)  # of effects whose lack a joint shows plainly
-RARE: dict[Scan | None, Scan] = {
+ON_QUIET_JOINTS: dict[Scan | None, Scan | None] = {  # of effects whose lack a joint shows plainly: none, or rare ones
+    plays: None,
+    springs: None,
     saturations: partial(saturations, rare=True),
     speed_limits: partial(speed_limits, rare=True),
-}  # of effects whose lack a joint shows plainly unless they act in few rows
+}
 
 
 @dataclass(frozen=True)
@@ -139,14 +140,10 @@ def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) 
     if effect.superposes:
         return [_regressed(fitter, setting, fit, name, basis, left)]
     scan = SCANS[effect.scan] if effect.scan else None
-    if (
-        (scan in LOUD or scan in RARE)
-        and setting.nominal.plant.tree is not None
-        and _is_quiet(fitter, setting, fit, name)
-    ):
-        if scan in LOUD:
+    if scan in ON_QUIET_JOINTS and setting.nominal.plant.tree is not None and _is_quiet(fitter, setting, fit, name):
+        scan = ON_QUIET_JOINTS[scan]
+        if scan is None:
             return []
-        scan = RARE[scan]
     atoms = (
         perturbations(effect, setting.scales[name.partition("/")[0]])
         if scan is None
