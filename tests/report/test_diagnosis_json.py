@@ -19,7 +19,7 @@ CONTRACT = {
 }
 ADDED = {
     "": {"sentence", "source", "corrected", "bounds", "notes", "seconds", "combined", "suspects", "remainder", "minor"},
-    "effects": {"share", "beyond_vocabulary", "everywhere", "rivals"},
+    "effects": {"share", "beyond_vocabulary", "unnamed", "rivals"},
     "location": set(),
     "fit": set(),
     "unexplained": {"shape", "resembles"},

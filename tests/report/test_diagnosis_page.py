@@ -45,7 +45,7 @@ def test_page_is_self_contained_and_shows_no_raw_missing_values(make, tmp_path):
 
 def test_small_laws_of_the_model_are_told_and_not_among_what_was_left_out():
     whole = synthetic_diagnosis.mismatch()
-    told = words(replace(whole, effects=whole.effects[:1], minor=whole.effects[1:2]))
+    told = words(replace(whole, effects=whole.effects[:1], minor=(replace(whole.effects[1], unnamed="small"),)))
     assert "Also in the completed model" in told
     assert "Also in the completed model" not in words(whole)
 
@@ -53,14 +53,22 @@ def test_small_laws_of_the_model_are_told_and_not_among_what_was_left_out():
 def test_laws_that_every_machine_follows_a_little_are_told_apart_from_small_ones():
     whole = synthetic_diagnosis.mismatch()
     friction, delay = whole.effects
-    encoder = replace(delay, name="sensor_theta/eccentricity", everywhere=True)
-    told = words(replace(whole, effects=(friction,), minor=(delay, encoder)))
+    encoder = replace(delay, name="sensor_theta/eccentricity", unnamed="everywhere")
+    told = words(replace(whole, effects=(friction,), minor=(replace(delay, unnamed="small"), encoder)))
     assert "Predictions hardly need it" in told
     assert "So is eccentricity of the pitch sensor" in told
     assert "Nearly every machine has a little of it" in told
     alone = words(replace(whole, effects=(friction,), minor=(encoder,)))
     assert "Predictions hardly need" not in alone
     assert "Also in the completed model: eccentricity of the pitch sensor" in alone
+
+
+def test_laws_that_are_not_proven_are_told_as_such():
+    whole = synthetic_diagnosis.mismatch()
+    friction, delay = whole.effects
+    told = words(replace(whole, effects=(friction,), minor=(replace(delay, unnamed="unproven"),)))
+    assert "Also in the completed model" in told
+    assert "Predictions are better with it, but other effects may do as well, or chance." in told
 
 
 def test_page_of_a_mismatch_says_what_where_how_sure_and_what_next():

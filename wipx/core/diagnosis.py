@@ -10,7 +10,7 @@ from wipx.core.model import Model
 from wipx.core.next_experiment import NextExperiment
 from wipx.core.remainder import Remainder, Unexplained
 from wipx.core.results import Estimate, FitErrors, Trace
-from wipx.core.suspect import Suspect
+from wipx.core.suspect import Suspect, Unnamed
 
 Verdict = Literal["consistent", "mismatch", "unexplained"]
 
@@ -64,7 +64,7 @@ class FoundEffect:
         present_probability: Of this name among those that could stand in its place.
         share: Of the explained mismatch.
         curve: Its law on the data; None where a curve over one signal does not show it.
-        everywhere: Whether every machine has a little of it, so that it is not named.
+        unnamed: Why it is in the completed model, but not named; None for an effect that is named.
     """
 
     name: str
@@ -79,7 +79,7 @@ class FoundEffect:
     present_probability: float
     share: float
     curve: Curve | None
-    everywhere: bool = False
+    unnamed: Unnamed | None = None
 
     def value(self, symbol: str) -> float:
         """Its number of that symbol [SI]."""
@@ -148,7 +148,7 @@ class Diagnosis:
         combined: Laws that the vocabulary lacks and that explain several of the effects at once as well.
         suspects: Hypotheses that were tested after the answer was complete, and what these recordings say of them.
         remainder: What the completed model leaves; None if it was not computed.
-        minor: Effects of the completed model that are too small beside what no law describes to be named.
+        minor: Effects of the completed model that are not named.
     """
 
     title: str

@@ -2,8 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from wipx.core.results import Estimate
+
+Unnamed = Literal["small", "everywhere", "unproven"]  # why an effect of a completed model is not named
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Suspect:
         loss: Nats by which the answer is better than with this effect; zero or less unless it is `in_place_of` others.
         size: Result for the suspected size; None if none was given.
         sentence: All of it in words.
-        minor: Whether it is part of the answer, but too small to be named.
+        unnamed: Why it is in the completed model, but not named; None where it is named, or not in the model.
     """
 
     name: str
@@ -60,7 +63,7 @@ class Suspect:
     loss: float
     size: SuspectedSize | None
     sentence: str = ""
-    minor: bool = False
+    unnamed: Unnamed | None = None
 
     @property
     def supported(self) -> bool:

@@ -66,7 +66,7 @@ def _effect(effect: FoundEffect) -> dict[str, object]:
         "present_probability": float(effect.present_probability),
         "share": float(effect.share),
         "beyond_vocabulary": bool(effect.outside_vocabulary),
-        "everywhere": bool(effect.everywhere),
+        "unnamed": effect.unnamed,
         "rivals": [
             {"name": rival.name, "separation": float(rival.separation), "parameters": _floats(rival.parameters)}
             for rival in effect.rivals
@@ -158,7 +158,7 @@ def _suspect(suspect: Suspect) -> dict[str, object]:
     return {
         "name": suspect.name,
         "sentence": suspect.sentence,
-        "named": suspect.named and not suspect.minor,
+        "named": suspect.named and suspect.unnamed is None,
         "in_place_of": list(suspect.in_place_of),
         "parameters": {symbol_of(number.name): _value(number) for number in suspect.parameters},
         "evidence": {

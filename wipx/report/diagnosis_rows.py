@@ -215,7 +215,7 @@ def suspect_rows(diagnosis: Diagnosis) -> list[SuspectRow]:
         SuspectRow(
             words=words.capitalised(effect_in_words(suspect.name, kind)),
             name=suspect.name,
-            named=suspect.named and not suspect.minor,
+            named=suspect.named and suspect.unnamed is None,
             numbers=tuple(map(_number_row, suspect.parameters)),
             evidence=words.nats(suspect.log_evidence_gain),
             required_gain=words.nats(suspect.required_gain),

@@ -21,7 +21,9 @@ def sentence(diagnosis: Diagnosis) -> str:
     if not parts and diagnosis.verdict == "consistent":
         return f"Nothing is missing that these recordings show: {stays}."
     if not parts:
-        return f"No effect of the vocabulary explains what is missing: {stays}."
+        unproven = any(effect.unnamed == "unproven" for effect in diagnosis.minor)
+        explains = "certainly explains" if unproven else "explains"
+        return f"No effect of the vocabulary {explains} what is missing: {stays}."
     share = diagnosis.held_out.explained_share
     found = f"{listed[:1].upper()}{listed[1:]} {verb} left out; adding {them} removes {percent(share)} of the mismatch"
     return f"{found}, and {stays}."

@@ -9,6 +9,7 @@ from wipx.core.location import Period, Region
 from wipx.core.next_experiment import NextExperiment
 from wipx.core.remainder import LeftForce
 from wipx.core.results import Estimate
+from wipx.core.suspect import Unnamed
 from wipx.effects.words import effect_in_words, in_a_row, site_in_words
 from wipx.report.numbers import MISSING, compact, significant, with_interval
 
@@ -29,6 +30,13 @@ PLANTS = MappingProxyType(
         "robot": "robot from a model file",
     }
 )
+UNNAMED: Mapping[Unnamed, str] = MappingProxyType(
+    {
+        "unproven": "Predictions are better with {them}, but other effects may do as well, or chance.",
+        "small": "Predictions hardly need {them}: what is so small may be a part of what no law describes.",
+        "everywhere": "Nearly every machine has a little of {them}, and predictions are better with {them}.",
+    }
+)  # why effects of the completed model are not named
 SURE = 0.999  # probabilities beyond are not told apart
 NO_CHANCE = 1e-3  # probability of chance below which something is certain, though it may be small
 
@@ -122,22 +130,13 @@ def minor_sentence(diagnosis: Diagnosis) -> str:
         laws = [f"{effect_in_words(each.name, kind)} ({own})" for each, own in zip(effects, numbers, strict=True)]
         return in_a_row(laws)
 
-    usual = [effect for effect in diagnosis.minor if effect.everywhere]
-    small = [effect for effect in diagnosis.minor if effect not in usual]
-    sentences = []
-    if small:
-        them = "it" if len(small) == 1 else "them"
-        sentences.append(
-            f"Also in the completed model: {told(small)}. Predictions hardly need {them}: what is so small may be a "
-            "part of what no law describes."
-        )
-    if usual:
-        begin = ("So is" if len(usual) == 1 else "So are") if small else "Also in the completed model:"
-        them = "it" if len(usual) == 1 else "them"
-        sentences.append(
-            f"{begin} {told(usual)}. Nearly every machine has a little of {them}, and predictions are better with "
-            f"{them}."
-        )
+    sentences: list[str] = []
+    for why, because in UNNAMED.items():
+        effects = [effect for effect in diagnosis.minor if effect.unnamed == why]
+        if effects:
+            is_one = len(effects) == 1
+            begin = ("So is" if is_one else "So are") if sentences else "Also in the completed model:"
+            sentences.append(f"{begin} {told(effects)}. {because.format(them='it' if is_one else 'them')}")
     return " ".join(sentences)
 
 

@@ -1,10 +1,18 @@
 """What the recordings say of a suspect, in words."""
 
-from wipx.core.suspect import Suspect, SuspectedSize
+from collections.abc import Mapping
+
+from wipx.core.suspect import Suspect, SuspectedSize, Unnamed
 from wipx.report.diagnosis_words import nats, symbol_of, value_in_words
 from wipx.report.numbers import compact, significant
 
 NOTHING = 0.05  # nats that are not told from none
+STANDING: Mapping[Unnamed | None, str] = {
+    None: "named",
+    "small": "in the completed model, but too small to be named",
+    "everywhere": "in the completed model, but every machine has a little of it",
+    "unproven": "in the completed model, but not proven",
+}
 AS_GOOD = 0.05  # relative change of the held-out error that is not told from none
 
 
@@ -28,7 +36,7 @@ def suspect_sentence(suspect: Suspect, *, unexplained: bool) -> str:
 def _free_size(suspect: Suspect) -> str:
     numbers = ", ".join(map(value_in_words, suspect.parameters))
     if suspect.named:
-        return f"{'in the completed model, but too small to be named' if suspect.minor else 'named'}, {numbers}"
+        return f"{STANDING[suspect.unnamed]}, {numbers}"
     gain = f"gain {nats(suspect.log_evidence_gain)} nats of the {nats(suspect.required_gain)} needed"
     if suspect.supported:
         gain = f"gain {nats(suspect.log_evidence_gain)} nats, enough to be named ({nats(suspect.required_gain)} needed)"

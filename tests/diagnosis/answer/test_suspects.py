@@ -213,5 +213,5 @@ def test_a_sentence_tells_size_evidence_transfer_and_what_of_the_figure():
 
 
 def test_a_sentence_says_that_an_effect_of_the_model_is_too_small_to_be_named():
-    small = replace(suspect_with(None), named=True, minor=True)
+    small = replace(suspect_with(None), named=True, unnamed="small")
     assert "in the completed model, but too small to be named, F_c = 0.21" in suspect_sentence(small, unexplained=True)

@@ -8,9 +8,10 @@ import pytest
 from diagnosis.recorded import SIMULATOR, Bench, bench, forecasts, shaken
 
 import wipx
-from wipx.diagnosis.decision.completion import completed, dominant, transferring
+from wipx.diagnosis.decision.completion import completed, dominant, likely, transferring
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis, Setting
 from wipx.diagnosis.likelihood.tolerances import tolerances
 from wipx.diagnosis.pipeline import KnownRobot, diagnose
@@ -62,6 +63,19 @@ def test_what_one_recording_has_of_its_own_is_no_law_of_the_machine(fresh_seed: 
     kept = transferring(context.held_out, search, both)
     assert kept.fit.effects == ("translation/coulomb",)
     assert [each.reason for each in kept.considered] == ["predicts held-out recordings worse"]
+
+
+def test_what_is_likely_joins_the_model_though_no_name_holds(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=4, duration=4.0), np.random.default_rng(fresh_seed))
+    monkeypatch.setattr(ForecastFitter, "holds", lambda self, smaller, larger: False)
+    search = search_of(case)
+    more = likely(search, search.nominal, None)
+    assert any(effect.startswith("translation/") for effect in more.fit.effects)  # one of the laws of friction
+    assert {each.name for each in more.considered} == set(more.fit.effects)
+    fitter = forecasts(case)
+    assert fitter.squared_scales(more.fit)[0] < fitter.squared_scales(search.nominal)[0]
+    monkeypatch.setattr(ForecastFitter, "is_likely", lambda self, smaller, larger: False)
+    assert likely(search, search.nominal, None).fit is search.nominal
 
 
 def test_a_drive_that_sags_sags_in_the_completed_model_and_makes_it_predict_better(fresh_seed: int):

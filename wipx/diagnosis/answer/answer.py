@@ -117,7 +117,7 @@ def _effects(
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
-    """Effects that are named, and those too small for that."""
+    """Effects that are named, and those that are not."""
 
     def told(piece: tuple[Search, Fit]) -> list[FoundEffect]:
         part, own = piece
@@ -126,10 +126,10 @@ def _effects(
 
     parts = context.fitter.simulator.side_by_side(told, search.split(rest.fit, with_stand_ins=True))
     found = sorted((effect for part in parts for effect in part), key=lambda effect: -effect.log_evidence_gain)
-    named = [effect for effect in found if effect.name not in rest.minor]
+    named = [effect for effect in found if effect.unnamed is None]
     total = sum(effect.log_evidence_gain for effect in named) or 1.0
     shared = tuple(replace(effect, share=effect.log_evidence_gain / total) for effect in named)
-    return shared, tuple(effect for effect in found if effect.name in rest.minor)
+    return shared, tuple(effect for effect in found if effect.unnamed is not None)
 
 
 def _effects_of_part(
@@ -140,12 +140,16 @@ def _effects_of_part(
     ends: tuple[Estimate, ...],
     shapes: list[Shape],
 ) -> list[FoundEffect]:
-    """What is told of the effects of a part, in their order; their shares are left open, and rivals of minor ones."""
+    """What is told of the effects of a part, in their order; their shares are left open.
+
+    Named ones have rivals, beside what is proven: an unproven effect may be one of them.
+    """
     found, fit = [], rest.fit
+    proven = search.store.reduced(fit, *rest.unproven) if rest.unproven else fit
     for effect in fit.effects:
         reduced = search.store.reduced(fit, effect)
         law = effect_of(effect, context.data.plant)
-        rivals, probability = ((), 1.0) if effect in rest.minor else _rivals(context, search, fit, effect)
+        rivals, probability = ((), 1.0) if rest.unnamed(effect) else _rivals(context, search, proven, effect)
         found.append(
             FoundEffect(
                 effect,
@@ -160,7 +164,7 @@ def _effects_of_part(
                 probability,
                 0.0,
                 law_curve(*context.fitter.seen_by_row(fit), effect, shapes),
-                bool(law.tolerance),
+                rest.unnamed(effect),
             )
         )
     return found

@@ -127,7 +127,7 @@ class _Asked:
             transfers=bool(repeated.likelihoods.sum() > known.sum()),
             loss=0.0 if named else -evidence(best, free),
             size=None,
-            minor=self.name in self.rest.minor,
+            unnamed=self.rest.unnamed(self.name),
         )
         if values:
             limit = (

@@ -53,6 +53,35 @@ def transferring(held_out: HeldOut, search: Search, fit: Fit) -> Chosen:
     return Chosen(kept, considered)
 
 
+def likely(search: Search, fit: Fit, held_out: HeldOut | None) -> Chosen:
+    """With further effects that make predictions better, one after the other, none of which is proven.
+
+    A name must hold among all effects that were looked at. The model has to predict: there it is enough that an effect
+    would hold if it were the only one.
+
+    Args:
+        search: Of the robot or of a part of it.
+        fit: Of what is named.
+        held_out: Judges whether they transfer to held-out recordings; None if there is only one.
+    """
+    fitter, considered = search.store.fitter, ()
+    assert isinstance(fitter, ForecastFitter)
+
+    def is_likely(larger: Fit) -> bool:
+        if evidence(fit, larger) < search.criteria.required_gain(fit, larger) or not fitter.is_likely(fit, larger):
+            return False
+        return held_out is None or held_out.transfers(fitter, fit, larger)
+
+    while len(fit.effects) < search.rules.most_effects:
+        larger = next(filter(is_likely, search.store.extensions(fit)), None)
+        if larger is None:
+            break
+        reason = "makes predictions better, but may have been picked by chance"
+        considered += (ConsideredEffect(larger.effects[-1], evidence(fit, larger), False, reason),)
+        fit = search.store.keep(fitter.converged(larger))
+    return Chosen(fit, considered)
+
+
 def completed(search: Search, fit: Fit) -> Fit:
     """With those laws that every machine follows a little and that make predictions better."""
     fitter, setting = search.store.fitter, search.store.setting

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from wipx.core.diagnosis import ConsideredEffect
+from wipx.core.suspect import Unnamed
 from wipx.diagnosis.candidates.screening import candidates_beside
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import deviations
@@ -18,7 +19,7 @@ from wipx.diagnosis.residuals.discrepancy import with_curve
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests, shapes_of
 from wipx.diagnosis.selection.criteria import evidence, score
 from wipx.diagnosis.selection.nested_laws import extended_effects
-from wipx.diagnosis.selection.search import Chosen, History, Search
+from wipx.diagnosis.selection.search import Chosen, History, Search, is_everywhere
 from wipx.effects.catalogue import effect_of
 
 BEYOND = 3  # laws from beyond the vocabulary that are fitted
@@ -38,6 +39,7 @@ class Rest:
         spread: Standard deviation of the stand-in at its knots [force or share]; empty where there is none.
         considered: What was looked at on the way, in order.
         minor: Effects of the fit that are too small beside what no law describes to be named.
+        unproven: Effects of the fit that make it predict better, but may have been picked by chance.
     """
 
     fit: Fit
@@ -48,6 +50,15 @@ class Rest:
     spread: np.ndarray
     considered: History = ()
     minor: tuple[str, ...] = ()
+    unproven: tuple[str, ...] = ()
+
+    def unnamed(self, effect: str) -> Unnamed | None:
+        """Why an effect of the fit is not named; None where it is."""
+        if effect in self.unproven:
+            return "unproven"
+        if effect in self.minor:
+            return "everywhere" if is_everywhere(effect) else "small"
+        return None
 
     def after(self, history: History) -> "Rest":
         """The same, with what was considered before."""

@@ -9,42 +9,21 @@ answer counts.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import replace
 
 import numpy as np
 
-from wipx.diagnosis.decision.completion import completed, dominant, transferring
-from wipx.diagnosis.decision.confirmation import Rest, decided, significant_residuals
+from wipx.diagnosis.decision.confirmation import Rest, decided
 from wipx.diagnosis.decision.context import Context
+from wipx.diagnosis.decision.found import Found, left_over, with_likely_effects, with_minor_effects
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
-from wipx.diagnosis.likelihood.tolerances import tolerances
-from wipx.diagnosis.residuals.residual_tests import Residual, Shape, shapes_of
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.robot_search import RobotSearch, search_of
-from wipx.diagnosis.selection.search import Chosen, Search, is_everywhere
+from wipx.diagnosis.selection.search import Chosen, Search
 
 Watcher = Callable[[str, float], None]
-Done = TypeVar("Done")
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a search ends with.
-
-    Attributes:
-        context: The means, with the evidence that decided.
-        search: The search.
-        rest: The final fit, and what it leaves over.
-        shapes: In which that was looked for.
-    """
-
-    context: Context
-    search: Search
-    rest: Rest
-    shapes: list[Shape]
 
 
 def found(context: Context, search: Search, watcher: Watcher) -> Found:
@@ -56,8 +35,8 @@ def found(context: Context, search: Search, watcher: Watcher) -> Found:
         watcher: Told the stage and the share that is done.
     """
     if isinstance(search, RobotSearch):
-        return _found_on_tree(context, search, watcher)
-    return _by_innovations(context, search, search.run(), watcher)
+        return with_likely_effects(_found_on_tree(context, search, watcher))
+    return with_likely_effects(_by_innovations(context, search, search.run(), watcher))
 
 
 def _found_on_tree(context: Context, search: RobotSearch, watcher: Watcher) -> Found:
@@ -199,7 +178,7 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit, *, afre
         best = search.run(search.fit_from(chosen) if chosen.effects and not afresh else None)
         ahead = ahead.trusting(best.fit)
         same_names = set(best.fit.effects) == set(chosen.effects)
-        return _with_minor_effects(Found(ahead, search, *_left_over(ahead, search.nominal, best))), same_names
+        return with_minor_effects(Found(ahead, search, *left_over(ahead, search.nominal, best))), same_names
     best = search.run()
     start = Hypothesis.of(setting, chosen.effects, chosen.hypothesis.values)
     same = nominal
@@ -212,87 +191,4 @@ def _by_forecasts(context: Context, fitter: ForecastFitter, chosen: Fit, *, afre
     hardly = set(same.effects) == set(best.fit.effects) or criteria.lead(best.fit, same) < least_gain
     agrees = bool(chosen.effects) and set(same.effects) == set(chosen.effects) and hardly
     ahead = ahead.trusting(best.fit)
-    return _with_minor_effects(Found(ahead, search, *_left_over(ahead, search.nominal, best))), agrees
-
-
-def _with_minor_effects(end: Found) -> Found:
-    """What forecasts found, with what every machine has a little of, and with small effects told.
-
-    Rich laws give way to simple ones first, which may be small. Small are those that remove little beside what no law
-    describes. They stay in the completed model, unless no other is there.
-    """
-    search, further = _completed_and_grown(end.search, end.rest.fit)
-    further = _without_harm(end.context, search, further)
-    simple = _by_part(search, further.fit, lambda part, own: part.simplified(own))
-    whole = _joined(search, further.fit, [chosen.fit for chosen in simple])
-    kept = _by_part(search, whole, dominant)
-    looked_at = (chosen.considered for chosen in (further, *simple, *kept))
-    considered = end.rest.considered + tuple(each for history in looked_at for each in history)
-    named = {effect for chosen in kept for effect in chosen.fit.effects if not is_everywhere(effect)}
-    if not named and end.rest.fit.effects:
-        search, whole = _completed(end.search, end.search.nominal)
-    small = {effect for effect in whole.effects if effect not in named}
-    minor = tuple(effect for effect in whole.effects if effect in small)
-    context = replace(end.context, setting=search.store.setting)
-    if whole is end.rest.fit:
-        return Found(context, search, replace(end.rest, minor=minor, considered=considered), end.shapes)
-    context = context.trusting(whole)
-    left, shapes = _left_over(context, search.nominal, Chosen(whole, considered))
-    left = replace(left, significant=left.significant or end.rest.significant, minor=minor)
-    return Found(context, search, left, shapes)
-
-
-def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
-    """A fit with the laws that every machine follows a little, and with further effects that show beside them only."""
-    search, whole = _completed(search, fit)
-    if whole is fit:
-        return search, Chosen(fit)
-    further = search.grown(whole)
-    if set(further.fit.effects) == set(whole.effects):
-        return search, Chosen(whole, further.considered)
-    search, whole = _completed(search, further.fit)
-    return search, Chosen(whole, further.considered)
-
-
-def _without_harm(context: Context, search: Search, chosen: Chosen) -> Chosen:
-    """Without effects that make predictions of held-out recordings worse; halves of one run may differ too much."""
-    fit = chosen.fit
-    if not context.several:
-        return chosen
-    kept = _by_part(search, fit, lambda part, own: transferring(context.held_out, part, own))
-    considered = chosen.considered + tuple(each for one in kept for each in one.considered)
-    return Chosen(_joined(search, fit, [one.fit for one in kept]), considered)
-
-
-def _completed(search: Search, fit: Fit) -> tuple[Search, Fit]:
-    """A search that knows the laws which every machine follows a little, and a fit with those that it needs."""
-    fitter = search.store.fitter
-    assert isinstance(fitter, ForecastFitter)
-    search = search.knowing(tolerances(search.store.setting, fitter, fitter.predictions, fit))
-    return search, _joined(search, fit, _by_part(search, fit, completed))
-
-
-def _by_part(search: Search, fit: Fit, do: Callable[[Search, Fit], Done]) -> list[Done]:
-    """What is done with each part of a robot that has effects, side by side."""
-    return search.store.fitter.simulator.side_by_side(lambda piece: do(*piece), search.split(fit))
-
-
-def _joined(search: Search, fit: Fit, parts: list[Fit]) -> Fit:
-    """The fit of a robot with what its parts have become; the same fit where none has changed."""
-    changed = any(new is not old for new, (_, old) in zip(parts, search.split(fit), strict=True))
-    return search.joined(fit, tuple(parts)) if changed else fit
-
-
-def _left_by_row(context: Context, fit: Fit, nominal: Fit, shapes: list[Shape]) -> tuple[list[Residual], float]:
-    """What is left over by innovations; mean commands feign what swings, which does not count there."""
-    left, p_value = significant_residuals(context, fit, fit.motion_likelihood - nominal.motion_likelihood, shapes)
-    return [one for one in left if one.shape.kind != "resonance" or not context.data.has_means], p_value
-
-
-def _left_over(context: Context, nominal: Fit, chosen: Chosen) -> tuple[Rest, list[Shape]]:
-    """What forecasts leave over, as innovations show it."""
-    by_row, seen = context.fitter.seen_by_row(chosen.fit)
-    shapes = shapes_of(by_row, seen)
-    left, p_value = _left_by_row(context, seen, context.fitter.seen_by_row(nominal)[1], shapes)
-    strongest = max(left, key=lambda residual: residual.gain) if left else None
-    return Rest(chosen.fit, strongest, p_value, bool(left), (), np.zeros(0), chosen.considered), shapes
+    return with_minor_effects(Found(ahead, search, *left_over(ahead, search.nominal, best))), agrees

@@ -189,13 +189,20 @@ class ForecastFitter(Fitter):
         are looked at together; likely ones were not picked from so many.
         """
         added = set(larger.effects) - set(smaller.effects)
-        picked_from = max(map(self._picked_from, added), default=1)
-        return self._agree_on(self._held_out(larger) - self._held_out(smaller), picked_from)
+        return self._predicts_better(smaller, larger, max(map(self._picked_from, added), default=1))
+
+    def is_likely(self, smaller: Fit, larger: Fit) -> bool:
+        """The same, as if nothing else had been looked at."""
+        return self._predicts_better(smaller, larger, 1)
 
     def completes(self, smaller: Fit, larger: Fit) -> bool:
         """Whether stretches of time agree that a law which every machine follows a little belongs to the model."""
         gains = self._judged_by_others(larger)[1] - self._judged_by_others(smaller)[1]
         return self._agree_on(gains, 1)
+
+    def _predicts_better(self, smaller: Fit, larger: Fit, picked_from: int) -> bool:
+        """Whether stretches of time agree that the larger one predicts others, beside doubts."""
+        return self._agree_on(self._held_out(larger) - self._held_out(smaller), picked_from)
 
     def _agree_on(self, gains: np.ndarray, picked_from: int) -> bool:
         """Whether what predictions gain, shape (N,), is no chance."""
