@@ -9,8 +9,9 @@ from diagnosis.recorded import Bench, bench
 from diagnosis.recorded_arm import arm, recorded
 
 from wipx.core.recording import Recording
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
-from wipx.diagnosis.candidates.screening import basis_of, candidates_of_effect
+from wipx.diagnosis.candidates.screening import candidates_of_effect
 
 GAIN = 12.5  # N per unit of a command without unit
 
@@ -55,7 +56,7 @@ def in_units(case: Bench, gain: float) -> Bench:
 def guesses(scan, effect: str, case: Bench, answer: float = 1.0) -> np.ndarray:
     """What a scan makes of what the nominal model leaves, or of a share of it."""
     fit = case.fit()
-    return scan(case.fitter, replace(fit, white=answer * fit.white), basis_of(fit), effect)
+    return scan(LeftOverByRow(case.fitter, replace(fit, white=answer * fit.white)), effect)
 
 
 def test_a_limit_of_few_rows_is_found_where_a_joint_is_quiet(tmp_path: Path, fresh_seed: int):

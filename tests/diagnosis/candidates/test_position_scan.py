@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from diagnosis.recorded import Bench, bench
 
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
-from wipx.diagnosis.candidates.screening import basis_of
 
 
 @pytest.mark.slow
@@ -35,5 +35,4 @@ def test_a_sticky_spot_is_found_where_it_is(width: float, fresh_seed: int):
 
 def guesses(scan, effect: str, case: Bench) -> np.ndarray:
     """What a scan makes of what the nominal model leaves."""
-    fit = case.fit()
-    return scan(case.fitter, fit, basis_of(fit), effect)
+    return scan(LeftOverByRow(case.fitter, case.fit()), effect)

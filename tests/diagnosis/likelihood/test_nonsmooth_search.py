@@ -7,8 +7,8 @@ from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.candidates.loose_drive_scan import plays
-from wipx.diagnosis.candidates.screening import basis_of
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.nonsmooth_search import alike, delays, searched_by_trial
 from wipx.sim.inputs import Inputs
@@ -33,8 +33,7 @@ def test_trials_lose_nothing_and_intervals_hold_drives_that_cross_alike(fresh_se
 
 def test_the_first_guess_crosses_about_as_the_true_drive_does(fresh_seed: int):
     case = bench("linear_axis", {PLAY: TRUE}, fresh_seed)
-    nominal = case.fit()
-    gap, inertia, _, returned, _ = plays(case.fitter, nominal, basis_of(nominal), "actuator/backlash")[0]
+    gap, inertia, _, returned, _ = plays(LeftOverByRow(case.fitter, case.fit()), "actuator/backlash")[0]
     assert returned == TRUE["returned"]
     assert 0.5 < gap * inertia / (TRUE["gap"] * TRUE["drive_inertia"]) < 2.0
 

@@ -8,8 +8,8 @@ import pytest
 from diagnosis.recorded import Bench
 from diagnosis.recorded_arm import arm, recorded
 
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.candidates.loose_drive_scan import springs
-from wipx.diagnosis.candidates.screening import basis_of
 from wipx.diagnosis.likelihood.hypothesis import ByForces, Hypothesis
 from wipx.diagnosis.selection.fit_store import FitStore
 from wipx.diagnosis.selection.nested_laws import reduced_effects
@@ -23,8 +23,7 @@ ALONE = np.sqrt(TRUE["stiffness"] / TRUE["drive_inertia"])  # [rad/s] of the dri
 def test_the_first_guess_swings_about_as_the_true_drive_does(tmp_path: Path, fresh_seed: int):
     model = arm(tmp_path)
     case = Bench(model, (recorded(model.with_effects({SPRING: TRUE}), fresh_seed),), {})
-    nominal = case.fit()
-    inertia, stiffness, _ = springs(case.fitter, nominal, basis_of(nominal), SPRING)[0]
+    inertia, stiffness, _ = springs(LeftOverByRow(case.fitter, case.fit()), SPRING)[0]
     assert np.sqrt(stiffness / inertia) == pytest.approx(ALONE, rel=0.3)
 
 

@@ -11,11 +11,9 @@ are compared.
 
 import numpy as np
 
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.candidates.peaks import peaks
-from wipx.diagnosis.candidates.position_scan import left_of
-from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.force_response import FAST, drive_force, motion_of, response
-from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.force_response import FAST, drive_force
 
 GUESSES = 6
 BY_COURSE = 3  # more, by the course of the response
@@ -26,45 +24,34 @@ RARE = 0.01  # share of the rows, up to which a limit may act and leave errors w
 SAME_LIMIT = 1.3  # ratio up to which two limits count as one, where their speeds are alike too
 
 
-def saturations(
-    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, *, rare: bool = False
-) -> np.ndarray:
+def saturations(left_over: LeftOverByRow, effect: str, *, rare: bool = False) -> np.ndarray:
     """Likely largest forces [N or N m], best first, shape (up to GUESSES + BY_COURSE, 1).
 
     Args:
-        fitter: Of the fit.
-        fit: What is already explained.
-        basis: What its numbers can imitate, orthonormal, shape (N, D).
+        left_over: By a fit.
         effect: Its name "site/saturation".
         rare: Whether to look only at those that act in few rows.
     """
-    return _likely(fitter, fit, basis, effect, np.array([np.inf]), rare)[:, :1]
+    return _likely(left_over, effect, np.array([np.inf]), rare)[:, :1]
 
 
-def speed_limits(
-    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, *, rare: bool = False
-) -> np.ndarray:
+def speed_limits(left_over: LeftOverByRow, effect: str, *, rare: bool = False) -> np.ndarray:
     """Likely stall forces [N or N m] and speeds without load, best first, shape (up to GUESSES + BY_COURSE, 2).
 
     Args:
-        fitter: Of the fit.
-        fit: What is already explained.
-        basis: What its numbers can imitate, orthonormal, shape (N, D).
+        left_over: By a fit.
         effect: Its name "site/speed_limit".
         rare: Whether to look only at those that act in few rows.
     """
-    return _likely(fitter, fit, basis, effect, SPEEDS, rare)
+    return _likely(left_over, effect, SPEEDS, rare)
 
 
-def _likely(
-    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, speeds: np.ndarray, rare: bool
-) -> np.ndarray:
-    data = fitter.data
+def _likely(left_over: LeftOverByRow, effect: str, speeds: np.ndarray, rare: bool) -> np.ndarray:
+    data, motion, model = left_over.fitter.data, left_over.motion, left_over.fit.hypothesis.model
     plant = data.plant
-    motion = motion_of(fitter, fit)
     driven = plant.joints_at(effect.partition("/")[0])
     joints = [plant.joints.index(joint) for joint in driven]
-    forces = [np.where(data.rows, drive_force(fit.hypothesis.model, motion, joint), 0.0) for joint in driven]
+    forces = [np.where(data.rows, drive_force(model, motion, joint), 0.0) for joint in driven]
     rates = [motion[plant.rates[joint]] for joint in joints]
     fastest = max(1e-9, *(float(np.quantile(np.abs(rate[data.counted]), FAST)) for rate in rates))
     shares = SHARES[SHARES <= RARE] if rare else SHARES
@@ -74,18 +61,22 @@ def _likely(
         stalls = np.unique(np.quantile(most[data.rows], 1.0 - shares, method="lower"))
         pairs += [(stall, free) for stall in stalls if 0.0 < stall < np.inf]
     pairs = np.array(pairs).reshape(-1, 2)
-    left = left_of(fit, basis)
     slopes, sizes = np.zeros(len(pairs)), np.zeros(len(pairs))
     for begin in range(0, len(pairs), TOGETHER):
         part = pairs[begin : begin + TOGETHER, :, None, None].swapaxes(0, 1)
-        change = sum(
-            response(fitter, fit, joint, limited(force, rate, *part) - force)
-            for joint, force, rate in zip(joints, forces, rates, strict=True)
+        change = np.sum(
+            [
+                left_over.answer(joint, limited(force, rate, *part) - force)
+                for joint, force, rate in zip(joints, forces, rates, strict=True)
+            ],
+            axis=0,
         )
-        change = change - basis @ (basis.T @ change)
-        slopes[begin : begin + TOGETHER], sizes[begin : begin + TOGETHER] = left @ change, np.sum(change**2, axis=0)
+        slopes[begin : begin + TOGETHER] = change @ left_over.errors
+        sizes[begin : begin + TOGETHER] = np.sum(change**2, axis=1)
     whole = -slopes - 0.5 * sizes
-    course = 0.5 * np.minimum(slopes, 0.0) ** 2 / np.maximum(sizes, 1e-300) - fitter.rules.selection.least_gain
+    course = (
+        0.5 * np.minimum(slopes, 0.0) ** 2 / np.maximum(sizes, 1e-300) - left_over.fitter.rules.selection.least_gain
+    )
     stall, free = pairs.T
 
     def same(i: int) -> np.ndarray:

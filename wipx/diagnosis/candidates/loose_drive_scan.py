@@ -10,8 +10,7 @@ from itertools import product
 import numpy as np
 
 from wipx.core.model import ModelBatch
-from wipx.diagnosis.candidates.position_scan import left_of
-from wipx.diagnosis.likelihood.fitting import Fit
+from wipx.diagnosis.candidates.left_over import LeftOverByRow
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.effects.catalogue import kind_of
 
@@ -28,18 +27,17 @@ DAMPING_RATIO = 0.05
 TOGETHER = 26  # models simulated at once; bounds the memory
 
 
-def plays(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
+def plays(left_over: LeftOverByRow, effect: str) -> np.ndarray:
     """Likely gaps [m or rad], numbers of the free drive, and times of contact, best first.
 
     Args:
-        fitter: Of the fit.
-        fit: What is already explained.
-        basis: What its numbers can imitate, orthonormal, shape (N, D).
+        left_over: By a fit.
         effect: Its name "site/backlash".
 
     Returns:
         Shape (GUESSES, 5), in the order of the effect's numbers.
     """
+    fitter = left_over.fitter
     joint = _joint(fitter, effect)
     way = float(np.ptp(fitter.data.measured[:, joint][fitter.data.rows]))
     inertia = _inertia(fitter, joint)
@@ -47,27 +45,25 @@ def plays(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) ->
         (gap * way, share * inertia, share * inertia * slowing, returned, CONTACT_TIME)
         for (share, slowing), returned, gap in product(DRIVES, RETURNED, GAPS)
     ]
-    return _best(fitter, fit, basis, effect, np.array(guesses))
+    return _best(left_over, effect, np.array(guesses))
 
 
-def springs(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str) -> np.ndarray:
+def springs(left_over: LeftOverByRow, effect: str) -> np.ndarray:
     """Likely inertias of a drive on a spring, stiffnesses and dampings of the spring, best first.
 
     Args:
-        fitter: See `plays`.
-        fit: See there.
-        basis: See there.
+        left_over: By a fit.
         effect: Its name "site/elasticity".
 
     Returns:
         Shape (GUESSES, 3), in the order of the effect's numbers.
     """
-    inertia = _inertia(fitter, _joint(fitter, effect))
+    inertia = _inertia(left_over.fitter, _joint(left_over.fitter, effect))
     guesses = []
     for share, frequency in product(ON_SPRINGS, FREQUENCIES):
         reduced, pulsation = inertia * share / (1.0 + share), 2.0 * np.pi * frequency
         guesses.append((share * inertia, reduced * pulsation**2, 2.0 * DAMPING_RATIO * reduced * pulsation))
-    return _best(fitter, fit, basis, effect, np.array(guesses))
+    return _best(left_over, effect, np.array(guesses))
 
 
 def _joint(fitter: InnovationFitter, effect: str) -> int:
@@ -80,21 +76,17 @@ def _inertia(fitter: InnovationFitter, joint: int) -> float:
     return 1.0 / float(np.median(fitter.innovations_model.linear.b[:, joint, joint]))
 
 
-def _best(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, effect: str, guesses: np.ndarray) -> np.ndarray:
+def _best(left_over: LeftOverByRow, effect: str, guesses: np.ndarray) -> np.ndarray:
     """The guesses that make the white innovations smaller by most, best first."""
-    left = left_of(fit, basis)
     parts = (guesses[i : i + TOGETHER] for i in range(0, len(guesses), TOGETHER))
-    gains = np.concatenate([_gains(fitter, fit, basis, left, effect, part) for part in parts])
+    gains = np.concatenate([_gains(left_over, effect, part) for part in parts])
     return guesses[np.argsort(-gains)[:GUESSES]]
 
 
-def _gains(
-    fitter: InnovationFitter, fit: Fit, basis: np.ndarray, left: np.ndarray, effect: str, guesses: np.ndarray
-) -> np.ndarray:
+def _gains(left_over: LeftOverByRow, effect: str, guesses: np.ndarray) -> np.ndarray:
     """By how much each guess makes the white innovations smaller [nats]."""
     symbols = list(kind_of(effect).neutral)
     names = tuple(f"{effect}.{symbol}" for symbol in symbols)
-    model = fit.hypothesis.model.with_effects({effect: dict(zip(symbols, guesses[0].tolist(), strict=True))})
-    change = fitter.white_of(fit, ModelBatch(model, names, guesses)) - fit.white.ravel()
-    change -= (change @ basis) @ basis.T
-    return -(change @ left) - 0.5 * np.sum(change**2, axis=1)
+    model = left_over.fit.hypothesis.model.with_effects({effect: dict(zip(symbols, guesses[0].tolist(), strict=True))})
+    change = left_over.freed(left_over.changes(ModelBatch(model, names, guesses)))
+    return -(change @ left_over.errors) - 0.5 * np.sum(change**2, axis=1)

@@ -8,8 +8,7 @@ first moment, beside any change of mass and of second moments; several masses wi
 import numpy as np
 
 from wipx.core.model import Model, ModelBatch
-from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.candidates.left_over import LeftOver
 from wipx.effects.catalogue import effect_of
 
 SMALL = 0.05  # of the link's mass
@@ -18,26 +17,22 @@ USUAL = 5.0  # standard deviation of each number, in multiples of those simulate
 DISTANCES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)  # [m] of the masses that are tried
 
 
-def point_masses(fitter: InnovationFitter, fit: Fit, basis: np.ndarray, name: str) -> np.ndarray:
+def point_masses(left_over: LeftOver, name: str) -> np.ndarray:
     """Mass [kg] and place [m] in the link's frame of likely payloads, shape (A, 4).
 
     Args:
-        fitter: Of the fit.
-        fit: What is already explained.
-        basis: What small changes of the fit's numbers make of its white innovations, orthonormal.
+        left_over: By a fit.
         name: Of the payload, "link_LINK/payload".
     """
-    model = fit.hypothesis.model
+    model = left_over.fit.hypothesis.model
     effect = effect_of(name, model.plant)
     tried = probes(model, name)
     small = tried[0, 0]
     names = tuple(f"{name}.{p.name}" for p in effect.parameters)
-    base = fit.white.ravel()
-    change = fitter.white_of(fit, ModelBatch(model.with_effects({name: effect.neutral}), names, tried)) - base
+    change = left_over.changes(ModelBatch(model.with_effects({name: effect.neutral}), names, tried))
     middle, ahead, behind = change[:1], change[1:4], change[4:]
-    columns = np.concatenate([middle, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - middle])
-    columns -= (columns @ basis) @ basis.T
-    amounts = -np.linalg.solve(columns @ columns.T + np.eye(len(columns)) / USUAL**2, columns @ base)
+    columns = left_over.freed(np.concatenate([middle, 0.5 * (ahead - behind), 0.5 * (ahead + behind) - middle]))
+    amounts = -np.linalg.solve(columns @ columns.T + np.eye(len(columns)) / USUAL**2, columns @ left_over.errors)
     moment = amounts[1:4] * small * ARM
     masses = masses_with(moment, float(amounts[0] * small))
     return np.column_stack([masses, moment / np.maximum(masses[:, None], 1e-300)])

@@ -6,21 +6,22 @@ freed of what the numbers already in the model can imitate, is compared with the
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from wipx.core.effect import Effect
 from wipx.core.model import ModelBatch
 from wipx.core.parameters import Scales
+from wipx.diagnosis.candidates.left_over import LeftOver, LeftOverByRow
 from wipx.diagnosis.candidates.limit_scan import saturations, speed_limits
 from wipx.diagnosis.candidates.loose_drive_scan import plays, springs
 from wipx.diagnosis.candidates.point_mass_scan import point_masses
 from wipx.diagnosis.candidates.position_scan import ripples, sticky_spots
 from wipx.diagnosis.likelihood.fitting import Fit, Fitter, damped_step
 from wipx.diagnosis.likelihood.hypothesis import Setting
-from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.effects.catalogue import vocabulary
 
 FURTHEST = 5.0  # times a dose, beyond which its effect is not taken for proportional
@@ -28,7 +29,7 @@ FAINTEST = 1e-12  # squared change of the innovations below which a dose does no
 PARTWAY = (1.0, 0.3)  # shares of the way to where an effect fits best if all is proportional; it hardly ever is
 CHUNK = 24  # models simulated at once; bounds the memory
 
-Scan = Callable[[InnovationFitter, Fit, np.ndarray, str], np.ndarray]
+Scan = Callable[[LeftOverByRow, str], np.ndarray]
 
 SCANS: dict[str, Scan] = {
     "periods": ripples,
@@ -80,10 +81,7 @@ def candidates_beside(
         outside_vocabulary: Whether to look at the effects that contract section 3 lacks instead of those it has.
     """
     names = list(names_beside(fitter, setting, fit, outside_vocabulary=outside_vocabulary))
-
-    def candidates(name: str) -> list[Candidate]:
-        return candidates_of_effect(fitter, setting, fit, name)
-
+    candidates = Screening(fitter, setting, fit).candidates
     # Parts of a robot of many joints are side by side already.
     small = setting.nominal.plant.tree is None
     found = fitter.simulator.side_by_side(candidates, names) if small else map(candidates, names)
@@ -124,97 +122,125 @@ def unscaled(setting: Setting, name: str) -> list[dict[str, float]]:
     if len(effect.linear_in) < len(effect.parameters):
         return []
     names = [f"{name}.{p.name}" for p in effect.parameters]
-    atoms = perturbations(effect, setting.scales[name.partition("/")[0]]).tolist()
+    atoms = perturbations(effect, setting.scales[_site(name)]).tolist()
     return [dict(zip(names, atom, strict=True)) for atom in atoms]
 
 
 def candidates_of_effect(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> list[Candidate]:
     """Where to start for one effect that could be added to a fit."""
-    effect = vocabulary(setting.nominal.plant)[name]
-    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
-    model = fit.hypothesis.model.with_effects({name: effect.neutral})
-    fit = replace(fit, levels=fitter.spread_for(model, fit.levels))
-    base = fit.white.ravel()
-    basis = basis_of(fit)
-    left = base - basis @ (basis.T @ base)
-    if effect.superposes:
-        return [_regressed(fitter, setting, fit, name, basis, left)]
-    scan = SCANS[effect.scan] if effect.scan else None
-    if scan in ON_QUIET_JOINTS and setting.nominal.plant.tree is not None and _is_quiet(fitter, setting, fit, name):
-        scan = ON_QUIET_JOINTS[scan]
-        if scan is None:
-            return []
-    atoms = (
-        perturbations(effect, setting.scales[name.partition("/")[0]])
-        if scan is None
-        else _scanned(scan, fitter, fit, name)
-    )
-    grown = np.array([p.name in effect.linear_in for p in effect.parameters])
-    neutral = np.array([p.neutral for p in effect.parameters])
-    low, high = _bounds(setting, name, effect)
-    found = []
-    for begin in range(0, len(atoms), CHUNK):
-        part = atoms[begin : begin + CHUNK]
-        change = fitter.white_of(fit, ModelBatch(model, names, part)) - base
-        beside = _make_room(fit, change)
-        change -= (change @ basis) @ basis.T
-        slope, size = change @ left, np.sum(change**2, axis=1)
-        for i, atom in enumerate(part):
-            best = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
-            dose = best if grown.any() and effect.non_smooth is None else 1.0  # what a gap does is not proportional
-            values = np.where(grown, neutral + dose * (atom - neutral), atom)
-            if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
-                continue
-            gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
-            estimate = neutral[0] + best * (atom[0] - neutral[0])
-            deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
-            start = dict(zip(names, values.tolist(), strict=True))
-            shares = PARTWAY if grown.all() and effect.non_smooth is None else (1.0,)
-            moved = tuple(_with_room(fit, s * dose * beside[i]) | _partway(start, effect, s) for s in shares)
-            found.append(Candidate(name, float(gain), start, moved, float(estimate), float(deviation)))
-    return found
+    return Screening(fitter, setting, fit).candidates(name)
 
 
-def _regressed(fitter: Fitter, setting: Setting, fit: Fit, name: str, basis: np.ndarray, left: np.ndarray) -> Candidate:
-    """Where to start for an effect whose numbers add up: their regression on what is left, (R m (K + 1),).
+@dataclass(frozen=True)
+class Screening:
+    """What effects are compared with.
 
-    Numbers of which the recordings tell nothing stay neutral: none is likely to be more than `FURTHEST` doses.
+    Attributes:
+        fitter: Fits and simulates.
+        setting: The robot.
+        fit: What is already explained.
     """
-    effect = vocabulary(setting.nominal.plant)[name]
-    names = tuple(f"{name}.{p.name}" for p in effect.parameters)
-    steps = perturbations(effect, setting.scales[name.partition("/")[0]])[0]
-    neutral = np.array([p.neutral for p in effect.parameters])
-    model = fit.hypothesis.model.with_effects({name: effect.neutral})
-    change = fitter.white_of(fit, ModelBatch(model, names, neutral + np.diag(steps))) - fit.white.ravel()
-    beside = _make_room(fit, change)
-    change -= (change @ basis) @ basis.T
-    covariance = np.linalg.inv(change @ change.T + np.eye(len(steps)) / FURTHEST**2)
-    slope = change @ left
-    amounts = np.clip(-covariance @ slope, -FURTHEST, FURTHEST)
-    values = np.clip(neutral + amounts * steps, *_bounds(setting, name, effect))
-    gain = -amounts @ slope - 0.5 * np.sum((amounts @ change) ** 2)
-    start = dict(zip(names, values.tolist(), strict=True))
-    moved = (_with_room(fit, amounts @ beside) | start,)
-    return Candidate(name, float(gain), start, moved, float(values[0]), float(steps[0] * np.sqrt(covariance[0, 0])))
 
+    fitter: Fitter
+    setting: Setting
+    fit: Fit
 
-def _is_quiet(fitter: Fitter, setting: Setting, fit: Fit, name: str) -> bool:
-    """Whether the laws of a fit leave the joint of an effect neither a force to speak of nor coloured errors."""
-    plant = setting.nominal.plant
-    j = plant.joints.index(plant.joint_at(name.partition("/")[0]))
-    by_row, seen = fitter.sketched_by_row(fit)
-    white = by_row.foretold(seen)[j] <= fitter.rules.trust.foretold
-    return bool(white) and not by_row.asks_for_force(seen.levels, setting.scales)[j]
+    @cached_property
+    def left_over(self) -> LeftOver:
+        """White errors that the fit leaves over."""
+        return LeftOver(self.fitter, self.fit)
 
+    @cached_property
+    def by_row(self) -> LeftOverByRow:
+        """White innovations that the fit leaves over."""
+        return LeftOverByRow(*self.fitter.sketched_by_row(self.fit))
 
-def _scanned(scan: Scan, fitter: Fitter, fit: Fit, name: str) -> np.ndarray:
-    """First guesses of an effect from how innovations answer to forces at single rows."""
-    by_row, seen = fitter.sketched_by_row(fit)
-    return scan(by_row, seen, basis_of(seen), name)
+    def candidates(self, name: str) -> list[Candidate]:
+        """Where to start for one effect."""
+        effect = vocabulary(self.setting.nominal.plant)[name]
+        model = self.fit.hypothesis.model.with_effects({name: effect.neutral})
+        own = self._with_levels(self.fitter.spread_for(model, self.fit.levels))
+        if effect.superposes:
+            return [own._regressed(name)]
+        return own._compared(name, own._atoms(name))
+
+    def _with_levels(self, levels: Any) -> "Screening":
+        """The same where the fit has other levels."""
+        return self if levels is self.fit.levels else replace(self, fit=replace(self.fit, levels=levels))
+
+    def _atoms(self, name: str) -> np.ndarray:
+        """Values of an effect's numbers at which it is looked for, shape (A, parameters) [SI]."""
+        effect = vocabulary(self.setting.nominal.plant)[name]
+        scan = SCANS[effect.scan] if effect.scan else None
+        if scan in ON_QUIET_JOINTS and self.setting.nominal.plant.tree is not None and self._is_quiet(name):
+            scan = ON_QUIET_JOINTS[scan]
+            if scan is None:
+                return np.zeros((0, len(effect.parameters)))
+        return perturbations(effect, self.setting.scales[_site(name)]) if scan is None else scan(self.by_row, name)
+
+    def _is_quiet(self, name: str) -> bool:
+        """Whether the laws of a fit leave the joint of an effect neither a force to speak of nor coloured errors."""
+        plant = self.setting.nominal.plant
+        j = plant.joints.index(plant.joint_at(_site(name)))
+        seen, trust = self.by_row, self.fitter.rules.trust
+        asks = seen.fitter.asks_for_force(seen.fit.levels, self.setting.scales)
+        return bool(seen.foretold[j] <= trust.foretold and not asks[j])
+
+    def _compared(self, name: str, atoms: np.ndarray) -> list[Candidate]:
+        """What each of some values, shape (A, parameters) [SI], would gain."""
+        effect = vocabulary(self.setting.nominal.plant)[name]
+        names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+        model = self.fit.hypothesis.model.with_effects({name: effect.neutral})
+        grown = np.array([p.name in effect.linear_in for p in effect.parameters])
+        neutral = np.array([p.neutral for p in effect.parameters])
+        low, high = _bounds(self.setting, name, effect)
+        found = []
+        for begin in range(0, len(atoms), CHUNK):
+            part = atoms[begin : begin + CHUNK]
+            change = self.left_over.changes(ModelBatch(model, names, part))
+            beside = _make_room(self.fit, change)
+            change = self.left_over.freed(change)
+            slope, size = change @ self.left_over.errors, np.sum(change**2, axis=1)
+            for i, atom in enumerate(part):
+                best = float(np.clip(-slope[i] / max(size[i], 1e-12), -FURTHEST, FURTHEST))
+                dose = best if grown.any() and effect.non_smooth is None else 1.0  # what a gap does is not proportional
+                values = np.where(grown, neutral + dose * (atom - neutral), atom)
+                if size[i] < FAINTEST or np.any(values < low) or np.any(values > high):
+                    continue
+                gain = -dose * slope[i] - 0.5 * dose**2 * size[i]
+                estimate = neutral[0] + best * (atom[0] - neutral[0])
+                deviation = abs(atom[0] - neutral[0]) / np.sqrt(size[i]) if grown[0] else np.inf
+                start = dict(zip(names, values.tolist(), strict=True))
+                shares = PARTWAY if grown.all() and effect.non_smooth is None else (1.0,)
+                moved = tuple(_with_room(self.fit, s * dose * beside[i]) | _partway(start, effect, s) for s in shares)
+                found.append(Candidate(name, float(gain), start, moved, float(estimate), float(deviation)))
+        return found
+
+    def _regressed(self, name: str) -> Candidate:
+        """Where to start for an effect whose numbers add up: their regression on what is left.
+
+        Numbers of which the recordings tell nothing stay neutral: none is likely to be more than `FURTHEST` doses.
+        """
+        effect = vocabulary(self.setting.nominal.plant)[name]
+        names = tuple(f"{name}.{p.name}" for p in effect.parameters)
+        steps = perturbations(effect, self.setting.scales[_site(name)])[0]
+        neutral = np.array([p.neutral for p in effect.parameters])
+        model = self.fit.hypothesis.model.with_effects({name: effect.neutral})
+        change = self.left_over.changes(ModelBatch(model, names, neutral + np.diag(steps)))
+        beside = _make_room(self.fit, change)
+        change = self.left_over.freed(change)
+        covariance = np.linalg.inv(change @ change.T + np.eye(len(steps)) / FURTHEST**2)
+        slope = change @ self.left_over.errors
+        amounts = np.clip(-covariance @ slope, -FURTHEST, FURTHEST)
+        values = np.clip(neutral + amounts * steps, *_bounds(self.setting, name, effect))
+        gain = -amounts @ slope - 0.5 * np.sum((amounts @ change) ** 2)
+        start = dict(zip(names, values.tolist(), strict=True))
+        moved = (_with_room(self.fit, amounts @ beside) | start,)
+        return Candidate(name, float(gain), start, moved, float(values[0]), float(steps[0] * np.sqrt(covariance[0, 0])))
 
 
 def _bounds(setting: Setting, name: str, effect: Effect) -> tuple[np.ndarray, np.ndarray]:
-    scales = setting.scales[name.partition("/")[0]]
+    scales = setting.scales[_site(name)]
     sizes = np.array([scales.of(p.dimension) for p in effect.parameters])
     return np.array([p.low for p in effect.parameters]) * sizes, np.array([p.high for p in effect.parameters]) * sizes
 
@@ -240,9 +266,5 @@ def _make_room(fit: Fit, changes: np.ndarray) -> np.ndarray:
     return moved
 
 
-def basis_of(fit: Fit) -> np.ndarray:
-    """What small changes of a fit's free numbers make of its white innovations, orthonormal, shape (R m (K + 1), D)."""
-    jacobian = fit.jacobian[: fit.white.size, fit.free]
-    if not jacobian.shape[1]:
-        return np.zeros((len(jacobian), 0))
-    return np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0]
+def _site(effect: str) -> str:
+    return effect.partition("/")[0]
