@@ -15,7 +15,7 @@ import numpy as np
 
 from wipx.diagnosis.decision.confirmation import Rest, decided
 from wipx.diagnosis.decision.context import Context
-from wipx.diagnosis.decision.found import Found, left_over, with_likely_effects, with_minor_effects
+from wipx.diagnosis.decision.names_and_model import Found, left_over, with_likely_effects, with_minor_effects
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.forecasts import ForecastFitter
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
