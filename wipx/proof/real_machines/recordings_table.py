@@ -134,9 +134,10 @@ def asked(suspect: Suspect) -> str:
     values = ", ".join(value_in_words(number) for number in suspect.parameters)
     others = f" in place of {' and '.join(suspect.in_place_of)}" if suspect.in_place_of else ""
     evidence = f"gains {nats(suspect.log_evidence_gain)} nats of {nats(suspect.required_gain)}"
-    named = "named" if suspect.named else evidence if suspect.supported else "not named"
+    standing = "named" if suspect.unnamed is None else "in the model without a name"
+    named = standing if suspect.named else evidence if suspect.supported else "not named"
     if suspect.size is None:
-        return f"{suspect.name}{others}: {'named' if suspect.named else evidence}; {values}"
+        return f"{suspect.name}{others}: {standing if suspect.named else evidence}; {values}"
     loss = suspect.size.loss_to_free if suspect.size.against_free else suspect.size.loss
     apart = f"{nats(abs(loss))} nats {'worse' if loss >= 0.0 else 'better'}"
     if suspect.size.excluded:
