@@ -26,6 +26,7 @@ from wipx.export.file_world import FileWorld, steps_within
 from wipx.export.mjcf import mujoco_module
 from wipx.recordings.model_file import read_model
 from wipx.sim import rows as R
+from wipx.sim.cache import settled
 from wipx.sim.coefficients import coefficients
 from wipx.sim.coupling import after, before, begin, between, show
 from wipx.sim.exchange import Exchange
@@ -147,6 +148,8 @@ class Runtime:
         self._lanes = np.zeros((2, W), dtype=np.int64)
         self._pointers, self._counts = np.zeros((width, W), dtype=np.int64), np.zeros(W, dtype=np.int64)
         self._row = 0
+        laws, X = self._laws, self._exchange.lanes
+        self._end_step = settled(between, self._rows, self._body, self._joints, ALONE, X, laws.on, laws.has, laws.rigid)
         self._take_over()
         self._show()
 
@@ -209,10 +212,9 @@ class Runtime:
             self._counts,
             least,
             0,
-            laws.rigid,
         )
         self._world.weigh()
-        between(A, S, B, ALONE, X, laws.on, laws.has, laws.rigid)
+        self._end_step(A, S, B, ALONE, X, laws.on, laws.has, laws.rigid)
         self._world.advance()
         after(S, B, ALONE, X)
         self.data.qpos[self._world.places] = self._places()

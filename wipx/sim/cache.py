@@ -102,6 +102,17 @@ def cached_for(*types):
     return decorate
 
 
+def settled(kernel: Any, *arguments: Any) -> Any:
+    """The machine code of a kernel for arguments of these types.
+
+    A call of it does not look at its arguments' types. numba finds that of a function anew at every call, which takes
+    longer than a step of a simulation.
+    """
+    types = tuple(kernel.typeof_pyval(argument) for argument in arguments)
+    kernel.compile(types)
+    return kernel.get_overload(types)
+
+
 def is_kept(kernel: Any) -> bool:
     """Whether machine code of a kernel is on the disk."""
     return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))

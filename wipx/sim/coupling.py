@@ -62,12 +62,17 @@ def begin(
     return least, most
 
 
+@law
+def nobody(S, B, n, on, asked):
+    """In place of a rigid body's code: the engine moves it."""
+
+
 @cached
-def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s, rigid):
+def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s):
     """Step s of a row up to the forces that act in mid-step, and where the engine is to stand."""
     if s == 0 or s >= least:
         set_step(S, B, n, has, counts, s)
-    step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, rigid)
+    step(A, S, B, n, on, has, t_rows, u_rows, ramps, lanes, pointers, nobody)
     for w in range(n):
         X.duration[w] = S[R.STEP * W + w]
     for j in range(len(has)):

@@ -14,6 +14,7 @@ import numpy as np
 from wipx.core.errors import check_positive
 from wipx.core.model import Model, ModelBatch
 from wipx.sim import rows as R
+from wipx.sim.cache import settled
 from wipx.sim.coefficients import coefficients
 from wipx.sim.coupling import after, before, begin, between, show
 from wipx.sim.exchange import Exchange
@@ -242,6 +243,9 @@ class _Run:
         loop = loop or self.layout.open_loop()
         n = filled(count)
         pattern, driven = self.layout.pattern, self.layout.driven
+        begin_step = settled(before, A, S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, 0, 0)
+        end_step = settled(between, A, S, B, n, X, on, has, rigid)
+        take_over = settled(after, S, B, n, X)
         for k in range(self.layout.rows):
             show(B, n, has, self.past, t, lanes, k, out, first, count, led, until)
             if controller is not None:
@@ -269,9 +273,9 @@ class _Run:
                 loop.settings,
             )
             for s in range(most):
-                before(A, S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s, rigid)
+                begin_step(A, S, B, n, X, on, has, t, commands, ramps, lanes, pointers, counts, least, s)
                 world.weigh()
-                between(A, S, B, n, X, on, has, rigid)
+                end_step(A, S, B, n, X, on, has, rigid)
                 world.advance()
-                after(S, B, n, X)
+                take_over(S, B, n, X)
         show(B, n, has, self.past, t, lanes, self.layout.rows, out, first, count, led, until)
