@@ -17,6 +17,7 @@ from wipx.effects.remainder import KNOTS
 from wipx.sim.coefficients import joint_count, joint_index
 
 ROUNDS = 3  # of linearising anew
+IMITATED = 0.02  # of the largest response: what is left of one that a fit's numbers imitate
 NUGGET = 1e-8
 FACTORS = {"force": 0.0, "gain": 1.0, "friction": -1.0}  # of the effect `remainder`, by kind of shape
 
@@ -61,7 +62,10 @@ def _triangle(matrix: np.ndarray) -> np.ndarray:
 
 
 def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, residual: Residual) -> tuple[Fit, np.ndarray]:
-    """A fit with a force over one signal added, refined, and the force's standard deviation at the knots."""
+    """A fit with a force over one signal added, refined, and the force's standard deviation at the knots.
+
+    What the numbers of the fit can do as well is left to them.
+    """
     shape = residual.shape
     name = f"{fitter.data.plant.joints[shape.joint]}/remainder"
     force = np.zeros(KNOTS)
@@ -71,12 +75,19 @@ def with_curve(fitter: InnovationFitter, setting: Setting, fit: Fit, residual: R
     for _ in range(ROUNDS):
         again = residual_tests(fitter, current, [shape])[0]
         change, spread = process_mean(again.slopes, current.white.ravel(), shape.knots)
-        force = force + change
+        force = _beyond(again.slopes, force + change)
         found = fitter.fit(with_force(setting, fit, name, shape, force, data), current.levels, steps=3)
         if found.log_likelihood < current.log_likelihood + 0.5:
             break
         current = found
     return fitter.converged(current, rounds=2), spread
+
+
+def _beyond(slopes: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """The part of a force at the knots, (KNOTS,), to which `slopes`, freed of the fit's numbers, answer."""
+    _, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
+    own = directions[sizes > IMITATED * sizes[0]]
+    return own.T @ (own @ force)
 
 
 def with_force(
