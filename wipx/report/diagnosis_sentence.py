@@ -18,10 +18,11 @@ def sentence(diagnosis: Diagnosis) -> str:
     listed = in_a_row(parts)
     verb, them = ("was", "it") if len(diagnosis.effects) == 1 else ("were", "them")
     stays = _stays(diagnosis.held_out)
+    unproven = any(effect.unnamed == "unproven" for effect in diagnosis.minor)
     if not parts and diagnosis.verdict == "consistent":
-        return f"Nothing is missing that these recordings show: {stays}."
+        nothing = "Nothing is certainly missing" if unproven else "Nothing is missing that these recordings show"
+        return f"{nothing}: {stays}."
     if not parts:
-        unproven = any(effect.unnamed == "unproven" for effect in diagnosis.minor)
         explains = "certainly explains" if unproven else "explains"
         return f"No effect of the vocabulary {explains} what is missing: {stays}."
     share = diagnosis.held_out.explained_share

@@ -64,9 +64,9 @@ def with_minor_effects(end: Found) -> Found:
 
 
 def with_likely_effects(end: Found) -> Found:
-    """The same names, in a model that predicts better with further effects, where forecasts leave something over."""
+    """The same names, in a model that predicts better with further effects, where forecasts decide."""
     search, fit = end.search, end.rest.fit
-    if not (isinstance(search.store.fitter, ForecastFitter) and end.rest.significant):
+    if not isinstance(search.store.fitter, ForecastFitter):
         return end
     held_out = end.context.held_out if end.context.several else None
     more = _by_part(search, fit, lambda part, own: likely(part, own, held_out))
@@ -77,7 +77,8 @@ def with_likely_effects(end: Found) -> Found:
     context = end.context.trusting(whole)
     left, shapes = left_over(context, search.nominal, Chosen(whole, considered))
     unproven = tuple(effect for effect in whole.effects if effect not in fit.effects)
-    return Found(context, search, replace(left, significant=True, minor=end.rest.minor, unproven=unproven), shapes)
+    left = replace(left, significant=left.significant or end.rest.significant, minor=end.rest.minor, unproven=unproven)
+    return Found(context, search, left, shapes)
 
 
 def _completed_and_grown(search: Search, fit: Fit) -> tuple[Search, Chosen]:
