@@ -56,7 +56,7 @@ def test_laws_that_every_machine_follows_a_little_are_told_apart_from_small_ones
     encoder = replace(delay, name="sensor_theta/eccentricity", unnamed="everywhere")
     told = words(replace(whole, effects=(friction,), minor=(replace(delay, unnamed="small"), encoder)))
     assert "Predictions hardly need it" in told
-    assert "So is eccentricity of the pitch sensor" in told
+    assert "The model also has eccentricity of the pitch sensor" in told
     assert "Nearly every machine has a little of it" in told
     alone = words(replace(whole, effects=(friction,), minor=(encoder,)))
     assert "Predictions hardly need" not in alone
@@ -68,7 +68,7 @@ def test_laws_that_are_not_proven_are_told_as_such():
     friction, delay = whole.effects
     told = words(replace(whole, effects=(friction,), minor=(replace(delay, unnamed="unproven"),)))
     assert "Also in the completed model" in told
-    assert "Predictions are better with it, but other effects may do as well, or chance." in told
+    assert "Predictions are better with it, but that may be chance, or the work of other effects." in told
 
 
 def test_page_of_a_mismatch_says_what_where_how_sure_and_what_next():

@@ -32,7 +32,7 @@ PLANTS = MappingProxyType(
 )
 UNNAMED: Mapping[Unnamed, str] = MappingProxyType(
     {
-        "unproven": "Predictions are better with {them}, but other effects may do as well, or chance.",
+        "unproven": "Predictions are better with {them}, but that may be chance, or the work of other effects.",
         "small": "Predictions hardly need {them}: what is so small may be a part of what no law describes.",
         "everywhere": "Nearly every machine has a little of {them}, and predictions are better with {them}.",
     }
@@ -135,7 +135,7 @@ def minor_sentence(diagnosis: Diagnosis) -> str:
         effects = [effect for effect in diagnosis.minor if effect.unnamed == why]
         if effects:
             is_one = len(effects) == 1
-            begin = ("So is" if is_one else "So are") if sentences else "Also in the completed model:"
+            begin = "The model also has" if sentences else "Also in the completed model:"
             sentences.append(f"{begin} {told(effects)}. {because.format(them='it' if is_one else 'them')}")
     return " ".join(sentences)
 

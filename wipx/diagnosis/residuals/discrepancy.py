@@ -17,7 +17,7 @@ from wipx.effects.remainder import KNOTS
 from wipx.sim.coefficients import joint_count, joint_index
 
 ROUNDS = 3  # of linearising anew
-IMITATED = 0.02  # of the largest response: what is left of one that a fit's numbers imitate
+IMITATED = 0.02  # of the largest response: what is left of one that numbers imitate; 0.005 on EMPS, the next one 0.18
 NUGGET = 1e-8
 FACTORS = {"force": 0.0, "gain": 1.0, "friction": -1.0}  # of the effect `remainder`, by kind of shape
 
