@@ -15,7 +15,7 @@ OPTIONS: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reass
 # Every function that a kernel calls is taken into it. Otherwise a kernel that has just been compiled would call another
 # copy of the function than one that is read from the disk, and the two round differently.
 TAKEN_IN: dict[str, Any] = {**OPTIONS, "forceinline": True, "no_cfunc_wrapper": True}
-law = numba.njit(**TAKEN_IN)  # by the compiler
+law = numba.njit(**TAKEN_IN, _nrt=False)  # by the compiler; it allocates nothing (`wipx.sim.cache.in_place`)
 inlined = numba.njit(**OPTIONS, inline="always")  # as source: loops over arrays compile three times faster so
 
 

@@ -257,6 +257,7 @@ class _Run:
                 last_row,
                 begin,
                 end,
+                *self.layout.block(len(self.coefficients.body)),
             )
 
         bounds = self._shares(first_row, last_row)

@@ -9,7 +9,7 @@ step, half a step of whose drift is taken back: together that is the kernel's po
 from wipx.core.law import law
 from wipx.sim import rows as R
 from wipx.sim.body import EVENT_TIME, share_after
-from wipx.sim.cache import cached
+from wipx.sim.cache import in_place
 from wipx.sim.kernel import begin_row, replay, respond, set_step, step
 from wipx.sim.rows import W
 from wipx.sim.sensors import feedback, guide, record
@@ -18,7 +18,7 @@ from wipx.sim.sticking import row_of
 LOST = 1e6  # [m, rad, m/s, rad/s]; beyond it a rollout has fallen over, and the engine is spared it
 
 
-@cached
+@in_place
 def show(B, n, has, past, t_rows, lanes, k, out, lane0, count, path, until):
     """Put the state where a path leads, if one does, and write what the sensors show at row k."""
     if k < len(path):
@@ -26,7 +26,7 @@ def show(B, n, has, past, t_rows, lanes, k, out, lane0, count, path, until):
     record(B, n, has, past, t_rows, lanes, k, out, lane0, count)
 
 
-@cached
+@in_place
 def begin(
     S,
     B,
@@ -67,7 +67,7 @@ def nobody(S, B, n, on, asked):
     """In place of a rigid body's code: the engine moves it."""
 
 
-@cached
+@in_place
 def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, counts, least, s):
     """Step s of a row up to the forces that act in mid-step, and where the engine is to stand."""
     if s == 0 or s >= least:
@@ -88,7 +88,7 @@ def before(A, S, B, n, X, on, has, t_rows, u_rows, ramps, lanes, pointers, count
             X.loaded[w] = share_after(S[R.STEP * W + w], S[R.TIME * W + w], S[EVENT_TIME * W + w])
 
 
-@cached
+@in_place
 def between(A, S, B, n, X, on, has, rigid):
     """The rates at the end of the step from the engine's mass matrix and bias, and the force that leads there."""
     joints = len(has)
@@ -117,7 +117,7 @@ def lost(S, X, w):
     return S[R.STEP * W + w] > 0.0 and not X.duration[w] > 0.0
 
 
-@cached
+@in_place
 def after(S, B, n, X):
     """Take over where the engine stands after its step."""
     for j in range(len(X.place)):

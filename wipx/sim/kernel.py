@@ -12,13 +12,11 @@ of mid-step, coordinates drift the other half; second order. Viscous terms are i
 mean rate, Coriolis terms use a predicted rate of mid-step.
 """
 
-import numpy as np
-
 from wipx.core.law import law, relaxing
 from wipx.sim import rows as R
 from wipx.sim.actuator import actuator_path, delayed_command, taken_back
 from wipx.sim.body import double_body, wip_body
-from wipx.sim.cache import cached
+from wipx.sim.cache import in_place
 from wipx.sim.joints import arrived, drifted, levels, smooth_friction
 from wipx.sim.rows import TOGETHER, W
 from wipx.sim.sensors import correct, feedback, guide, keep, pushed, record
@@ -176,7 +174,7 @@ def set_step(S, B, n, has, counts, s):
                 J[R.PAPER_KEPT * W + w], J[R.PAPER_MEAN * W + w] = kept, mean
 
 
-@cached
+@in_place
 def rollout(
     body,
     blocks,
@@ -211,6 +209,10 @@ def rollout(
     last_row,
     begin,
     end,
+    A,
+    lanes,
+    pointers,
+    counts,
 ):
     """Simulate lanes [begin, end) of robots with N joints: lane = model * windows + window.
 
@@ -248,18 +250,17 @@ def rollout(
         last_row: Row to which they are brought.
         begin: First lane.
         end: Lane after the last.
+        A: Room for a block, shape ((N BLOCK + rows) W,).
+        lanes: Room for the window of each of its lanes, and for the column of its commands, shape (2, W).
+        pointers: Room for the row whose command is just leaving each joint's transport delay, shape (N, W).
+        counts: Room for the steps of the present row, shape (W,).
     """
     windows = substeps.shape[1]
     joints = len(has)
-    A = np.zeros((joints * R.BLOCK + len(body)) * W)
     B, S = A[: joints * R.BLOCK * W].reshape((joints, R.BLOCK * W)), A[joints * R.BLOCK * W :]
-    pointers = np.zeros((joints, W), dtype=np.int64)
-    counts = np.zeros(W, dtype=np.int64)
-    lanes = np.zeros((2, W), dtype=np.int64)
     for lane0 in range(begin, end, W):
         count = min(W, end - lane0)
         n = filled(count)
-        pointers[:] = 0
         for w in range(n):
             lane = lane0 + min(w, count - 1)  # a short block repeats its last lane
             lanes[0, w] = lane % windows
@@ -267,6 +268,7 @@ def rollout(
             for i in range(len(body)):
                 S[i * W + w] = body[i, lane // windows]
             for j in range(joints):
+                pointers[j, w] = 0
                 for i in range(R.BLOCK):
                     B[j, i * W + w] = blocks[j, i, lane // windows]
                 for i in range(R.STATES):

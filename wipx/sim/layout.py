@@ -119,6 +119,12 @@ class Layout:
         ramps[:, self.driven] = self.inputs.ramps
         return ramps
 
+    def block(self, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Room for a block of lanes of a robot with so many rows: A, lanes, pointers and counts of `rollout`."""
+        room = np.zeros((self.width * R.BLOCK + rows) * R.W)
+        lanes, pointers = np.zeros((2, R.W), dtype=np.int64), np.zeros((self.width, R.W), dtype=np.int64)
+        return room, lanes, pointers, np.zeros(R.W, dtype=np.int64)
+
     def held(self) -> np.ndarray:
         """Stands for commands that do not change along a row."""
         return np.zeros((1, self.width, 1))

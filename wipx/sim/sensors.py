@@ -44,8 +44,9 @@ def record(B, n, has, past, t_rows, lanes, k, out, lane0, count):
                 sine, cosine = sin_cos(J[R.ECCENTRIC_NUMBER * W + w] * J[R.SHOWN * W + w])
                 error = J[R.ECCENTRIC_SINE * W + w] * sine + J[R.ECCENTRIC_COSINE * W + w] * cosine
                 J[R.SHOWN * W + w] += error / J[R.ECCENTRIC_NUMBER * W + w]
-        out[k, j, lane0 : lane0 + count] = J[R.SHOWN * W : R.SHOWN * W + count]
-        out[k, joints + j, lane0 : lane0 + count] = J[R.V * W : R.V * W + count]
+        for w in range(count):
+            out[k, j, lane0 + w] = J[R.SHOWN * W + w]
+            out[k, joints + j, lane0 + w] = J[R.V * W + w]
 
 
 @law
@@ -55,8 +56,9 @@ def feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, no
     joints = len(gains)
     for j in range(joints):
         J = B[j]
-        J[R.NOISE * W : R.NOISE * W + count] = noise[k, j, lane0 : lane0 + count]
-        J[R.NOISE_RATE * W : R.NOISE_RATE * W + count] = noise[k, joints + j, lane0 : lane0 + count]
+        for w in range(count):
+            J[R.NOISE * W + w] = noise[k, j, lane0 + w]
+            J[R.NOISE_RATE * W + w] = noise[k, joints + j, lane0 + w]
         for w in range(n):
             window = lanes[0, w]
             J[R.REFERENCE * W + w] = references[k, j, window]
@@ -86,7 +88,8 @@ def feedback(B, n, t_rows, u_rows, lanes, k, lane0, count, gains, references, no
                 C[R.COMMAND * W + w] -= off + rate * (J[R.MEASURED_RATE * W + w] - J[R.REFERENCE_RATE * W + w])
         for w in range(n):
             C[R.COMMAND * W + w] = clip(C[R.COMMAND * W + w], -limit, limit)
-        u_rows[k, c, lane0 : lane0 + count] = C[R.COMMAND * W : R.COMMAND * W + count]
+        for w in range(count):
+            u_rows[k, c, lane0 + w] = C[R.COMMAND * W + w]
 
 
 @law

@@ -95,7 +95,7 @@ def _own(joint: int, row: int) -> str:
 
 
 def _function(name: str, lines: Sequence[str]) -> str:
-    head = ["@law", f"def {name}(S, B, n):", "    F = B.ravel()", "    for w in range(U(n)):"]
+    head = ["@law", f"def {name}(S, B, n):", "    F = B.reshape(B.size)", "    for w in range(U(n)):"]
     return "\n".join([*head, *(f"        {line}" for line in lines)])
 
 
