@@ -179,7 +179,7 @@ def unexplained_sentence(diagnosis: Diagnosis) -> str:
     named = {effect.name for effect in diagnosis.effects}
     others = [effect_in_words(name, kind) for name in left.resembles if name not in named]
     if others:
-        sentence += f" It resembles {' or '.join(others)}."
+        sentence += f" It resembles {' or '.join(others)}, which the vocabulary does not have."
     return sentence
 
 

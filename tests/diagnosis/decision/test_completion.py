@@ -125,6 +125,7 @@ def test_what_every_machine_has_is_in_the_model_but_not_named(fresh_seed: int):
     assert "actuator/sag" not in {effect.name for effect in answer.effects}
     minor = {effect.name for effect in answer.minor}
     assert minor <= set(answer.model.effects)
+    assert "sag" not in answer.unexplained.shape  # what the model has is not what it leaves over
     assert all(answer.held_out.completed[name] < answer.held_out.nominal[name] for name in ("x",))
 
 

@@ -220,7 +220,8 @@ def _is_richer(other: Fit, name: str, effect: str, data: RecordingBatch) -> bool
 
 def _unexplained(context: Context, rest: Rest, unruly: tuple[str, ...]) -> Unexplained:
     laws = {name: effect_of(name, context.data.plant) for name in rest.fit.effects}
-    outside_vocabulary = [name for name, law in laws.items() if not context.fitter.looks_for(name, law)]
+    foreign = [name for name, law in laws.items() if not context.fitter.looks_for(name, law)]
+    outside_vocabulary = [name for name in foreign if name not in rest.minor]
     if rest.significant and outside_vocabulary:
         words = " and ".join(effect_in_words(name, context.data.plant.kind) for name in outside_vocabulary)
         return Unexplained(True, rest.p_value, outside_vocabulary[0].partition("/")[0], words, rest.resembles, None)
