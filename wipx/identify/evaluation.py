@@ -1,7 +1,8 @@
 """Judging a model: prediction errors over windows, and the predictions themselves."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,9 @@ TRIAL = 0.25  # [s] between the predictions by which filters are compared
 RIGHT = 3.0  # [rad/s] bandwidth of the filter that follows a right model
 LEARNT = 1.5  # [s] of trials before which no filter is preferred to the usual one
 USUAL = 3  # filter from which a prediction starts before any trial, among `BANDWIDTHS`
+REMEMBERED = 8  # answers that may be asked for again
+
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class Judge:
     horizon: float
     bandwidths: Mapping[str, float] | None = None
     _smoothers: list[Smoother] = field(default_factory=list, compare=False, repr=False)
+    _answers: list[tuple[Any, Any]] = field(default_factory=list, compare=False, repr=False)
 
     def predict(self, model: Model, recordings: tuple[Recording, ...]) -> list[np.ndarray]:
         """Predicted coordinates of each recording, shape (rows, joints); NaN before the first window."""
@@ -58,6 +63,26 @@ class Judge:
         self, nominal: Model, completed: Model, recordings: tuple[Recording, ...], *, held_out: bool
     ) -> tuple[FitErrors, tuple[Trace, ...]]:
         """Errors of two models on the same windows, and what they predicted."""
+
+        def compared() -> tuple[FitErrors, tuple[Trace, ...]]:
+            return self._compared(nominal, completed, recordings, held_out=held_out)
+
+        return self._once(compared, recordings, nominal, completed, held_out)
+
+    def _once(self, answer: Callable[[], Answer], recordings: tuple[Recording, ...], *question: Any) -> Answer:
+        """An answer about recordings, computed unless it is one of the latest."""
+        self._smoother(question[0], recordings)  # keeps the recordings: their identities stay theirs
+        asked = (self.simulator, self.horizon, self.bandwidths, [id(recording) for recording in recordings], *question)
+        known = next((found for other, found in self._answers if other == asked), None)
+        if known is None:
+            known = answer()
+            self._answers.append((asked, known))
+            del self._answers[:-REMEMBERED]
+        return known
+
+    def _compared(
+        self, nominal: Model, completed: Model, recordings: tuple[Recording, ...], *, held_out: bool
+    ) -> tuple[FitErrors, tuple[Trace, ...]]:
         plant = nominal.plant
         starts = self._starts(completed, recordings)
         windows = starts.windows
@@ -81,6 +106,9 @@ class Judge:
 
     def tuned(self, model: Model, recordings: tuple[Recording, ...]) -> Model:
         """A model with the bandwidths of the filter from whose states it predicts recordings best."""
+        return self._once(lambda: self._tuned(model, recordings), recordings, model)
+
+    def _tuned(self, model: Model, recordings: tuple[Recording, ...]) -> Model:
         joints = len(self.noise)
         best = self._best_of(model, recordings, [np.full(joints, bandwidth) for bandwidth in BANDWIDTHS])
         for j in range(joints if joints > 1 else 0):

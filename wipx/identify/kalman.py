@@ -5,6 +5,7 @@ linearised along the recording; they say what innovations of a row, and of those
 (Anderson, Moore 1979, Optimal Filtering, ch. 7).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -118,10 +119,10 @@ def gains_along(
     t: np.ndarray,
     last: np.ndarray,
     sensor: np.ndarray,
-    rate: np.ndarray,
+    rates: Sequence[np.ndarray],
     late: np.ndarray,
-) -> Gains:
-    """Gains along R recordings.
+) -> list[Gains]:
+    """Gains along R recordings of several filters.
 
     Args:
         linear: The body along them.
@@ -129,16 +130,18 @@ def gains_along(
         t: Times of the rows, shape (K + 1, R) [s].
         last: Last row of each recording, shape (R,).
         sensor: Standard deviation of each coordinate, shape (joints,) [m or rad].
-        rate: Variance by which each acceleration wanders, shape (joints,) [(m or rad)^2/s^5].
+        rates: Variance by which each acceleration wanders in each filter, shape (joints,) [(m or rad)^2/s^5].
         late: Delay of each sensor, shape (joints,) [s].
     """
     moves = _moves(linear.a, linear.place, t, last)
-    n = 3 * len(late)
-    gains = np.zeros((*t.shape, n, len(late)))
-    covariance = np.zeros_like(moves)
-    innovation = np.zeros((*t.shape, len(late), len(late)))
-    _filter(moves, t, last, sensor**2, rate, late, jolts, gains, covariance, innovation)
-    return Gains(moves, gains, covariance, innovation)
+    n, found = 3 * len(late), []
+    for rate in rates:
+        gains = np.zeros((*t.shape, n, len(late)))
+        covariance = np.zeros_like(moves)
+        innovation = np.zeros((*t.shape, len(late), len(late)))
+        _filter(moves, t, last, sensor**2, rate, late, jolts, gains, covariance, innovation)
+        found.append(Gains(moves, gains, covariance, innovation))
+    return found
 
 
 @cached_for(floats(3), integers(2), floats(2), integers(1))

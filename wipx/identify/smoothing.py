@@ -189,18 +189,22 @@ class Smoother:
         return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
 
     def filtered(self, model: Model, bandwidth: np.ndarray) -> Filter:
-        """The filter of a model.
+        """The filter of a model, of bandwidths (joints,) [rad/s]."""
+        return self.filters(model, [bandwidth])[0]
+
+    def filters(self, model: Model, bandwidths: Sequence[np.ndarray]) -> list[Filter]:
+        """Filters of a model.
 
         Args:
             model: The model.
-            bandwidth: Of each joint, shape (joints,) [rad/s].
+            bandwidths: Of each joint in each filter, shape (joints,) [rad/s].
         """
         inputs, one = self._inputs, ModelBatch(model)
         scale, late = scales_of(one)[:, 0], delays_of(one)[:, 0]
         sensor = self.noise / np.abs(scale)
-        rate = (np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval
-        along = gains_along(*self._body(model), inputs.t, inputs.last, sensor, rate, late)
-        return Filter(along, scale, late)
+        rates = [(np.asarray(bandwidth) ** 3 * sensor) ** 2 * self._interval for bandwidth in bandwidths]
+        gains = gains_along(*self._body(model), inputs.t, inputs.last, sensor, rates, late)
+        return [Filter(along, scale, late) for along in gains]
 
     def _body(self, model: Model) -> tuple[Linearisation, np.ndarray]:
         """A model's body along the recordings, and by how much commands that are not logged move it within each row."""

@@ -47,7 +47,7 @@ class Starts:
 
 def starts_of(smoother: Smoother, windows: Windows, model: Model, bandwidths: Sequence[np.ndarray]) -> Starts:
     """Starts by one model, with filters of B bandwidths, each of shape (joints,) [rad/s]."""
-    filters = [smoother.filtered(model, bandwidth) for bandwidth in bandwidths]
+    filters = smoother.filters(model, bandwidths)
     return starts_by(smoother, windows, ModelBatch(model, (), np.zeros((len(filters), 0))), filters)
 
 

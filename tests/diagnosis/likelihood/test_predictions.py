@@ -42,7 +42,7 @@ def test_what_a_joint_carries_along_a_recording_is_there_where_a_prediction_star
     seen = forecasts(case).predictions
 
     def error_of_elbow() -> float:
-        found = seen.errors(ModelBatch(true), [seen.filtered(true, np.full(2, 100.0))])[0]
+        found = seen.errors(ModelBatch(true), seen.filters(true, [np.full(2, 100.0)]))[0]
         return float(np.sqrt(np.mean(found[seen.counted, -1] ** 2)))
 
     own, at_once = error_of_elbow(), predictions.starts_at_once

@@ -340,7 +340,7 @@ class ForecastFitter(Fitter):
     def prediction_starts(self, model: Model, bandwidths: Sequence[np.ndarray] | None = None) -> PredictionStarts:
         """Starts by the model, of the filter from which its predictions are likeliest."""
         tried = list(bandwidths) if bandwidths is not None else [np.full(self.data.joints, b) for b in BANDWIDTHS]
-        filters = [self.predictions.filtered(model, bandwidth) for bandwidth in tried]
+        filters = self.predictions.filters(model, tried)
         if len(tried) == 1:
             return PredictionStarts(tried[0], filters[0])
         errors = self.predictions.errors(ModelBatch(model, (), np.zeros((len(tried), 0))), filters)

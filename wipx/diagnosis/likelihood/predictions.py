@@ -103,9 +103,9 @@ class Predictions:
         own = [[channels[c] for c in group if channels[c] < joints] for group in self.data.groups]
         return tuple((first + np.array(coordinates)).ravel() for coordinates in own)
 
-    def filtered(self, model: Model, bandwidths: np.ndarray) -> Filter:
-        """The filter of a model, of bandwidths (joints,) [rad/s], along the recordings."""
-        return self._smoother.filtered(model, bandwidths)
+    def filters(self, model: Model, bandwidths: Sequence[np.ndarray]) -> list[Filter]:
+        """Filters of a model along the recordings, each of bandwidths (joints,) [rad/s]."""
+        return self._smoother.filters(model, bandwidths)
 
     @cached_property
     def _smoother(self) -> Smoother:
