@@ -49,7 +49,7 @@ def measure_diagnosis() -> dict[str, float]:
         {
             "gains": lambda: observer_gains(*body, data, levels),
             "simulation, innovations": lambda: fitter.innovations_model.innovations(*follow),
-            "colours": lambda: [noise_model_of(each, data) for each in innovations],
+            "noise models": lambda: [noise_model_of(each, data) for each in innovations],
         },
         ROUNDS,
     )
