@@ -43,7 +43,7 @@ def test_changes_of_state_and_of_command_go_on_as_in_the_simulator(kd: float, tm
         by_command = (ends[:, 8:10] - ends[:, 10:]) / (2.0 * small)
         transition, pushed = np.zeros((4, 4)), np.zeros((4, 2))
         dt = float(recording.t[row + 1] - recording.t[row])
-        transition_over(linear.a[linear.place[row, 0]], dt, transition, pushed)
+        transition_over(linear.a[linear.place[row, 0]], dt, transition, pushed, np.zeros_like(transition))
         size = np.array([dt, dt, 1.0, 1.0])[:, None]
         np.testing.assert_allclose(transition / size, by_state / size, atol=0.03 * np.abs(by_state / size).max())
         expected = pushed @ slopes[row, 0]

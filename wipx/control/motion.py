@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from wipx.core.law import clip, law, sin_cos
+from wipx.core.law import clip, inlined, law, sin_cos
 from wipx.effects import dead_zone, quadratic_drag, stribeck
 from wipx.sim import body as B
 from wipx.sim import rows as R
@@ -53,7 +53,7 @@ def inverse_mass(y, c, joints, double):
     return m22 / determinant, -m12 / determinant, m11 / determinant
 
 
-@law
+@inlined
 def slopes(y, commands, c, joints, double, ease):
     """Rates and accelerations of both joints at the state y = [coordinates, rates]."""
     first, second = joints[0], joints[1]
@@ -77,14 +77,14 @@ def slopes(y, commands, c, joints, double, ease):
     return np.array([y[2], y[3], w11 * force + w12 * force1, w12 * force + w22 * force1])
 
 
-@law
+@inlined
 def moved(y, commands, step, c, joints, double, ease):
     """The state after a `step`, by the midpoint rule."""
     middle = y + 0.5 * step * slopes(y, commands, c, joints, double, ease)
     return y + step * slopes(middle, commands, c, joints, double, ease)
 
 
-@law
+@inlined
 def spread(y, step, density, c, joints, double):
     """Covariance that white forces of a spectral `density` (2,) [N^2 s] add in a `step`, shape (4, 4)."""
     w11, w12, w22 = inverse_mass(y, c, joints, double)

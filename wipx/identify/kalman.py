@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wipx.core.law import inlined
+from wipx.core.law import law
 from wipx.identify.linearisation import Linearisation, transition_over
 from wipx.sim.cache import cached_for, floats, integers, tuples
 
@@ -148,11 +148,11 @@ def gains_along(
 def _moves(a, place, t, last):
     """Transitions to every row from the one before, shape (K + 1, R, n, n)."""
     joints, size = a.shape[1:]
-    small, pushed = np.zeros((size, size)), np.zeros((size, joints))
+    small, pushed, work = np.zeros((size, size)), np.zeros((size, joints)), np.zeros((size, size))
     found = np.zeros((*place.shape, size + joints, size + joints))
     for r in range(place.shape[1]):
         for k in range(last[r]):
-            transition_over(a[place[k, r]], t[k + 1, r] - t[k, r], small, pushed)
+            transition_over(a[place[k, r]], t[k + 1, r] - t[k, r], small, pushed, work)
             move = found[k + 1, r]
             move[:size, :size] = small
             move[:size, size:] = pushed
@@ -185,7 +185,7 @@ def _filter(moves, t, last, sensor, rate, late, jolts, gains, covariance, innova
                 p[: 2 * joints, : 2 * joints] += jolts[k, r]
 
 
-@inlined
+@law
 def _show(p, sensor, late, shown, innovation):
     """Covariance of the state with what the sensors show, (n, joints), and that of what they show."""
     joints = len(late)
@@ -198,7 +198,7 @@ def _show(p, sensor, late, shown, innovation):
         innovation[i, i] += sensor[i]
 
 
-@inlined
+@law
 def _invert(a):
     """Invert a positive definite matrix in place, by Gauss and Jordan without pivots."""
     n = len(a)
@@ -215,7 +215,7 @@ def _invert(a):
                     a[i, j] -= weight * a[k, j]
 
 
-@inlined
+@law
 def _correct(p, shown, inverse, gain):
     """Gain of a row, and the covariance (n, n) after it."""
     joints = len(inverse)
@@ -232,13 +232,14 @@ def _correct(p, shown, inverse, gain):
             p[i, j] = p[j, i] = total
 
 
-@inlined
+@law
 def _predict(p, move, work):
     """Covariance (n, n) after a move, which leaves the accelerations, the last third of the state, as they are."""
     n = len(p)
     moved = n - n // 3
-    work[:moved] = 0.0
-    work[moved:] = p[moved:]
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = 0.0 if i < moved else p[i, j]
     for i in range(moved):
         for c in range(n):
             for j in range(n):
@@ -249,10 +250,9 @@ def _predict(p, move, work):
             for c in range(n):
                 total += work[i, c] * move[j, c]
             p[i, j] = p[j, i] = total
-    p[moved:, moved:] = work[moved:, moved:]
 
 
-@inlined
+@law
 def _wander(p, rate, dt):
     """Add to a covariance what accelerations that wander do to the state within an interval."""
     joints = len(rate)
@@ -304,12 +304,12 @@ def _smooth(along, closed, told, rows, recordings, until, prior, surprises, foun
         _add_product(along.covariance[k, r], now, found[w])
 
 
-@inlined
+@law
 def _add_product(columns, of, to):
     """Add the product of a matrix, given by its columns, with some columns to `to`, as many rows as that has."""
     rows, models = to.shape
     if models == 1:  # the longer loop is the inner one
-        only = to.ravel()
+        only = to.reshape(to.size)
         for c in range(len(of)):
             column, factor = columns[c], of[c, 0]
             for i in range(rows):

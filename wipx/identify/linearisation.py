@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wipx.core.law import inlined
+from wipx.core.law import law
 from wipx.core.model import Model, ModelBatch
 from wipx.sim.analytic import AnalyticSimulator
 from wipx.sim.inputs import Inputs
@@ -114,12 +114,12 @@ def _accelerations(model: Model, commands: np.ndarray, states: np.ndarray) -> np
     return ((run.rates[1] - run.rates[0]) / STEP).reshape(joints, -1)
 
 
-@inlined
-def transition_over(a, dt, transition, pushed):
+@law
+def transition_over(a, dt, transition, pushed, work):
     """exp(A dt), written to `transition`, and what accelerations of one, held over dt, do to the state, to `pushed`.
 
     A has the slopes `a` of the accelerations. A series of third order over so short a time that it is good, doubled as
-    often as it takes to reach dt.
+    often as it takes to reach dt. `work` has room for a matrix like `transition`.
     """
     joints, n = a.shape
     stiffest = 0.0
@@ -133,11 +133,30 @@ def transition_over(a, dt, transition, pushed):
         doublings += 1
     _short_transition(a, dt / 2.0**doublings, transition, pushed)
     for _ in range(doublings):
-        pushed += transition @ pushed
-        transition[:] = transition @ transition
+        _multiply(transition, pushed, work)
+        for i in range(n):
+            for j in range(joints):
+                pushed[i, j] += work[i, j]
+        _multiply(transition, transition, work)
+        for i in range(n):
+            for j in range(n):
+                transition[i, j] = work[i, j]
 
 
-@inlined
+@law
+def _multiply(left, right, product):
+    """Write the product of two matrices, into the first columns of a third."""
+    rows, columns = right.shape
+    for i in range(len(left)):
+        for j in range(columns):
+            product[i, j] = 0.0
+        for q in range(rows):
+            weight = left[i, q]
+            for j in range(columns):
+                product[i, j] += weight * right[q, j]
+
+
+@law
 def _short_transition(a, dt, transition, pushed):
     """The same to third order."""
     joints, n = a.shape

@@ -266,7 +266,7 @@ def plain_filter(
         whitening.append(np.linalg.inv(np.linalg.cholesky(s)))
         dt = float(data.intervals[k, r]) if k < data.inputs.last[r] else 0.0
         place = linear.place[k, r]
-        transition_over(linear.a[place], dt, transition, np.zeros((2 * joints, joints)))
+        transition_over(linear.a[place], dt, transition, np.zeros((2 * joints, joints)), np.zeros_like(transition))
         drive = linear.b[place] @ np.diag(levels.force**2) @ linear.b[place].T
         drive = drive if t[k] > SETTLES else UNSETTLED * drive
         held = np.block([[dt**3 / 3.0 * drive, dt**2 / 2.0 * drive], [dt**2 / 2.0 * drive, dt * drive]])

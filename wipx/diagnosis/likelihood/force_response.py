@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from wipx.core.law import inlined
+from wipx.core.law import law
 from wipx.core.model import Model
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
@@ -105,34 +105,64 @@ def _driven(a, b, place, intervals, last, channels, gains, whitening, forces):
     n, m = 2 * joints, len(channels)
     out = np.zeros((rows, m, recordings, columns))
     transition, kept, show = np.zeros((n, n)), np.zeros((n, n)), np.zeros((m, n))
-    held, push = np.zeros((n, joints)), np.zeros(n)
+    held, push, work = np.zeros((n, joints)), np.zeros(n), np.zeros((n, n))
+    states, moved = np.zeros((n, columns)), np.zeros((n, columns))
     for r in range(recordings):
-        states, moved = np.zeros((n, columns)), np.zeros((n, columns))
+        states[:] = 0.0
         for k in range(last[r] + 1):
-            for d in range(m):
-                for i in range(m):
-                    show[d, channels[i]] = -whitening[k, r, d, i]
-            _add_product(out[k, :, r], show, states)
-            if k == last[r]:
-                break
-            dt, g = intervals[k, r], place[k, r]
-            transition_over(a[g], dt, transition, held)
-            kept[:] = transition
-            _add_product(kept, transition, -gains[k, r])
-            push[:] = held @ b[g]
-            for i in range(n):
-                for c in range(columns):
-                    moved[i, c] = push[i] * forces[r, k, c]
-            _add_product(moved, kept, states)
-            states, moved = moved, states
+            _show(whitening[k, r], channels, states, show, out[k, :, r])
+            if k < last[r]:
+                g = place[k, r]
+                transition_over(a[g], intervals[k, r], transition, held, work)
+                _correct(transition, gains[k, r], kept)
+                _push(held, b[g], push)
+                _move(kept, push, states, forces[r, k], moved)
+                states, moved = moved, states
     return out
 
 
-@inlined
-def _add_product(total, weights, states):
-    """Add the product of two matrices; the second has many columns."""
-    for i in range(len(total)):
+@law
+def _show(whitening, channels, states, show, out):
+    """White innovations (m, C) of a row that errors of the states (n, C) cause."""
+    for d in range(len(channels)):
+        for i in range(len(channels)):
+            show[d, channels[i]] = -whitening[d, i]
+    for d in range(len(show)):
         for j in range(len(states)):
-            weight = weights[i, j]
+            weight = show[d, j]
             for c in range(states.shape[1]):
-                total[i, c] += weight * states[j, c]
+                out[d, c] += weight * states[j, c]
+
+
+@law
+def _correct(transition, gain, kept):
+    """What an interval leaves of an error that was corrected first: the transition times (1 - gain)."""
+    n = len(transition)
+    for i in range(n):
+        for j in range(n):
+            kept[i, j] = transition[i, j]
+        for q in range(n):
+            weight = transition[i, q]
+            for c in range(gain.shape[1]):
+                kept[i, c] -= weight * gain[q, c]
+
+
+@law
+def _push(held, b, push):
+    """What a force of one on a joint does to the states in an interval."""
+    for i in range(len(held)):
+        push[i] = 0.0
+        for j in range(len(b)):
+            push[i] += held[i, j] * b[j]
+
+
+@law
+def _move(kept, push, states, forces, moved):
+    """Errors of the states (n, C) one interval later."""
+    for i in range(len(kept)):
+        for c in range(len(forces)):
+            moved[i, c] = push[i] * forces[c]
+        for j in range(len(states)):
+            weight = kept[i, j]
+            for c in range(len(forces)):
+                moved[i, c] += weight * states[j, c]

@@ -175,10 +175,10 @@ def _combine(half, whitening, gain):
 
 
 @inlined
-def _move(a, b, place, interval, force, recording, recordings, own, pushed, transition, drive, dt):
+def _move(a, b, place, interval, force, recording, recordings, own, pushed, work, transition, drive, dt):
     """Transition over an interval, and what white forces do meanwhile, for all levels on one recording."""
     joints, n = b.shape[1], len(own)
-    transition_over(a[place], interval, own, pushed)
+    transition_over(a[place], interval, own, pushed, work)
     for level in range(len(force)):
         w = level * recordings + recording
         dt[w] = interval
@@ -261,7 +261,7 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
     drive, dt, noise = np.zeros((joints, joints, lanes)), np.zeros(lanes), np.zeros(lanes)
     half, root = np.zeros((m, n, lanes)), np.zeros((m, lanes))
     inverse, gain = np.zeros((m, m, lanes)), np.zeros((n, m, lanes))
-    own, pushed = np.zeros((n, n)), np.zeros((n, joints))
+    own, pushed, room = np.zeros((n, n)), np.zeros((n, joints)), np.zeros((n, n))
     for k in range(rows):
         _begin(covariance, sensor[:, :joints], time, k)
         for c in range(m):
@@ -276,6 +276,7 @@ def _riccati(a, b, place, intervals, last, channels, force, sensor, late, time, 
             break
         for r in range(recordings):
             louder = 1.0 if time[k, r] > SETTLES else UNSETTLED
-            _move(a, b, place[k, r], intervals[k, r], louder * force, r, recordings, own, pushed, transition, drive, dt)
+            loud, g, interval = louder * force, place[k, r], intervals[k, r]
+            _move(a, b, g, interval, loud, r, recordings, own, pushed, room, transition, drive, dt)
         _predict(covariance, transition, work)
         _shake(covariance, drive, jolts[k], dt)
