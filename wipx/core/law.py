@@ -15,7 +15,8 @@ OPTIONS: dict[str, Any] = {"fastmath": {"nsz", "arcp", "contract", "afn", "reass
 # Every function that a kernel calls is taken into it. Otherwise a kernel that has just been compiled would call another
 # copy of the function than one that is read from the disk, and the two round differently.
 TAKEN_IN: dict[str, Any] = {**OPTIONS, "forceinline": True, "no_cfunc_wrapper": True}
-law = numba.njit(**TAKEN_IN, _nrt=False)  # by the compiler; it allocates nothing (`wipx.sim.cache.in_place`)
+IN_PLACE: dict[str, Any] = {"_nrt": False}  # for what allocates nothing (`wipx.sim.cache.in_place`)
+law = numba.njit(**TAKEN_IN, **IN_PLACE)  # by the compiler
 inlined = numba.njit(**OPTIONS, inline="always")  # as source: loops over arrays compile three times faster so
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numba
 from numba.core import config as numba_settings
 
-from wipx.core.law import OPTIONS
+from wipx.core.law import IN_PLACE, OPTIONS
 
 PACKAGE = Path(__file__).resolve().parent.parent
 UNSEEN = "blind_robots"  # folder whose code is its own, and which nothing else may open
@@ -99,7 +99,7 @@ def in_place(function):
     third of its time.
     """
     _keep_on_disk()
-    return numba.njit(**KEPT, _nrt=False)(function)
+    return numba.njit(**KEPT, **IN_PLACE)(function)
 
 
 def cached_for(*types):
@@ -158,5 +158,5 @@ def part(function):
     _keep_on_disk()
     rows, blocks, flags = numba.types.float64[::1], numba.types.float64[:, ::1], numba.types.boolean[::1]
     return numba.cfunc(
-        numba.types.void(rows, blocks, numba.types.int64, flags, numba.types.int64), cache=True, _nrt=False, **OPTIONS
+        numba.types.void(rows, blocks, numba.types.int64, flags, numba.types.int64), cache=True, **OPTIONS, **IN_PLACE
     )(function)
