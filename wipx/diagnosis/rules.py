@@ -38,50 +38,53 @@ def rule(value: float, unit: str, meaning: str, origin: str, neutral: float | No
     return field(default=value, metadata={"note": Note(unit, meaning, origin, neutral)})
 
 
-@dataclass(frozen=True)
 class EvidenceRules:
-    """What each kind of evidence has for itself.
+    """What both kinds of evidence are asked; the values here decide nothing.
 
     Attributes:
-        promising: Share of the best expected gain.
-        worthless: Expected gain [nats].
-        unproven: Number of effects.
-        unsteady: Share of a size.
+        promising: Share of the best expected gain below which an effect is not fitted.
+        worthless: Expected gain below which an effect is not fitted [nats].
+        unproven: Effects that need not transfer to held-out recordings, at most.
+        unsteady: Usual standard deviation from run to run, as a share of a size.
     """
 
-    promising: float
-    worthless: float
-    unproven: int
-    unsteady: float
-
-
-PROMISING = "share of the best expected gain below which an effect is not fitted"
-WORTHLESS = "expected gain below which an effect is not fitted"
-UNPROVEN = "effects that need not transfer to held-out recordings, at most"
-UNSTEADY = "usual standard deviation of a size from run to run; widens intervals"
+    promising = 0.0
+    worthless = -UNLIMITED
+    unproven = 0
+    unsteady = 0.0
 
 
 @dataclass(frozen=True)
 class InnovationRules(EvidenceRules):
     """Which effects innovations let in."""
 
-    promising: float = rule(0.05, "", PROMISING, DEVELOPING, 0.0)
-    worthless: float = rule(3.0, "nats", WORTHLESS, "derived: less than the penalty of one number", 0.0)
-    unproven: int = rule(4, "effects", UNPROVEN, f"{REAL}: small effects fill up what stays unexplained", 99)
-    unsteady: float = rule(0.0, "of the size", UNSTEADY, "derived: where laws hold, sizes stay", 0.0)
+    promising: float = rule(
+        0.05, "", "share of the best expected gain below which an effect is not fitted", DEVELOPING, 0.0
+    )
+    worthless: float = rule(
+        3.0,
+        "nats",
+        "expected gain below which an effect is not fitted",
+        "derived: less than the penalty of one number",
+        0.0,
+    )
+    unproven: int = rule(
+        4,
+        "effects",
+        "effects that need not transfer to held-out recordings, at most",
+        f"{REAL}: small effects fill up what stays unexplained",
+        99,
+    )
 
 
 @dataclass(frozen=True)
 class ForecastRules(EvidenceRules):
-    """Which effects forecasts let in."""
+    """Which effects forecasts let in: each is fitted, and none is taken on trust."""
 
-    promising: float = rule(0.0, "", PROMISING, "every effect is fitted", 0.0)
-    worthless: float = rule(-UNLIMITED, "nats", WORTHLESS, "every effect is fitted", -UNLIMITED)
-    unproven: int = rule(0, "effects", UNPROVEN, f"{REAL}: no effect is taken on trust where no law holds", 99)
     unsteady: float = rule(
         0.1,
         "of the size",
-        UNSTEADY,
+        "usual standard deviation of a size from run to run; widens intervals",
         "from the literature: load and temperature change friction by tens of per cent (Bittencourt, Gunnarsson 2012)",
         0.0,
     )
