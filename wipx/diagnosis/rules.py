@@ -148,13 +148,11 @@ class SelectionRules:
         "chosen on the emulated testbed, which has eight: with four, predictions err three times as much",
         99,
     )
-    worth_pairing: float = rule(
-        4.0, "nats", "gain of an effect, not enough alone, for which a second one is sought", DEVELOPING, UNLIMITED
-    )
     expected_share: float = rule(
         0.5,
         "of what an effect must gain",
-        "expected gain from which an effect of one of many joints is fitted, and gain from which it is paired",
+        "expected gain from which an effect of one of many joints is fitted, and gain, not enough alone, from which a "
+        "second effect is sought",
         "derived: of two effects that share what they must gain, one gains half of it",
         0.0,
     )
@@ -177,22 +175,8 @@ class ConfirmationRules:
     doubtful: float = rule(
         50.0, "nats", "gain below which an effect must transfer to held-out recordings", DEVELOPING, 0.0
     )
-    minor: float = rule(
-        0.25,
-        "of the leading effect's gain",
-        "gain below which an effect must show in held-out predictions",
-        DEVELOPING,
-        0.0,
-    )
-    most_misfit: float = rule(
-        150.0,
-        "nats",
-        "gain from which an effect is no misfit of another law",
-        DEVELOPING,
-        UNLIMITED,
-    )
-    visible: float = rule(
-        0.05, "of the squared error", "what such an effect must remove from held-out predictions", DEVELOPING, 0.0
+    certain_beside_backlash: float = rule(
+        150.0, "nats", "gain beside a backlash from which an effect is certain whatever its interval", DEVELOPING, 0.0
     )
     tolerated: float = rule(
         0.05,
@@ -201,33 +185,13 @@ class ConfirmationRules:
         REAL,
         UNLIMITED,
     )
-    given_up: float = rule(
-        0.1,
-        "of an effect's gain",
-        "what a rival may lack that takes the place of an effect which held-out recordings contradict",
-        DEVELOPING,
-        0.0,
-    )
 
 
 @dataclass(frozen=True)
 class ResidualRules:
     """When something is left over."""
 
-    level: float = rule(
-        1e-4,
-        "p value, corrected",
-        "chance of a residual where nothing is named",
-        "judgement: a false alarm costs more than a second recording",
-        1.0,
-    )
-    level_beside_effects: float = rule(
-        1e-3,
-        "p value, corrected",
-        "the same beside named effects",
-        "judgement: where something was missing, more of it is less of a surprise",
-        1.0,
-    )
+    level: float = rule(1e-3, "p value, corrected", "chance of a residual that is none", "usual level", 1.0)
     least_gain: float = rule(20.0, "nats", "gain of a curve", DEVELOPING, 0.0)
     least_swing: float = rule(
         15.0, "nats", "gain of a resonance", "derived from that of a curve: three numbers instead of nine", 0.0

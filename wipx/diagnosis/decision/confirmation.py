@@ -13,7 +13,7 @@ from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.decision.estimates import deviations
 from wipx.diagnosis.likelihood import nonsmooth_search
 from wipx.diagnosis.likelihood.fitting import Fit
-from wipx.diagnosis.likelihood.held_out import Transfer, transfer
+from wipx.diagnosis.likelihood.held_out import transfer
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.residuals.discrepancy import with_curve
 from wipx.diagnosis.residuals.residual_tests import Residual, Shape, residual_tests, shapes_of
@@ -23,7 +23,6 @@ from wipx.diagnosis.selection.search import Chosen, History, Search, is_everywhe
 from wipx.effects.catalogue import effect_of
 
 BEYOND = 3  # laws from beyond the vocabulary that are fitted
-RIVALS = 4  # that may take the place of an effect which held-out recordings contradict
 
 
 @dataclass(frozen=True)
@@ -66,83 +65,54 @@ class Rest:
 
 
 def decided(context: Context, search: Search, chosen: Chosen) -> tuple[Rest, list[Shape]]:
-    """What is kept of the effects that the selection chose, what they leave over, and the shapes it was looked for in.
-
-    Small effects that held-out predictions do not show are kept where something is left without them and nothing
-    with them: what is left is then no misfit of another law.
-    """
+    """What is kept of the chosen effects, what they leave over, and the shapes that it was looked for in."""
     kept = confirmed_by_part(context, search, chosen.fit)
     shapes = shapes_of(context.by_row, kept.fit)
-    rest = remaining(context, search, kept.fit, shapes).after(kept.considered)
-    if rest.significant and len(kept.fit.effects) < len(chosen.fit.effects):
-        more = confirmed_by_part(context, search, chosen.fit, small=True)
-        if set(more.fit.effects) > set(kept.fit.effects):
-            whole = remaining(context, search, more.fit, shapes)
-            if not whole.significant:
-                rest = whole.after(more.considered)
-    return rest.after(chosen.considered), shapes
+    return remaining(context, search, kept.fit, shapes).after(chosen.considered + kept.considered), shapes
 
 
-def confirmed_by_part(context: Context, search: Search, fit: Fit, *, small: bool = False) -> Chosen:
+def confirmed_by_part(context: Context, search: Search, fit: Fit) -> Chosen:
     """Each part of a robot without its effects that are not confirmed (`confirmed`)."""
     parts = search.split(fit)
-    found = context.fitter.simulator.side_by_side(
-        lambda piece: confirmed(context.beside(piece[0]), *piece, small=small), parts
-    )
+    found = context.fitter.simulator.side_by_side(lambda piece: confirmed(context.beside(piece[0]), *piece), parts)
     considered = tuple(each for chosen in found for each in chosen.considered)
     if all(chosen.fit is own for chosen, (_, own) in zip(found, parts, strict=True)):
         return Chosen(fit, considered)
     return Chosen(search.joined(fit, tuple(chosen.fit for chosen in found)), considered)
 
 
-def confirmed(
-    context: Context, search: Search, fit: Fit, *, small: bool = False, seen: frozenset[frozenset[str]] = frozenset()
-) -> Chosen:
-    """Without effects that change no prediction to speak of, or do not transfer to held-out recordings.
+def confirmed(context: Context, search: Search, fit: Fit) -> Chosen:
+    """Without effects that change no prediction to speak of, may be nothing, or do not transfer to other recordings.
 
     Args:
         context: The means.
         search: The search that chose the effects.
         fit: Of the effects.
-        small: Whether small effects are kept that held-out predictions do not show.
-        seen: Sets of effects that were left already; an exchange does not lead back to them.
     """
     if not fit.effects:
         return Chosen(fit)
-    seen |= {frozenset(fit.effects)}
     repeated = transfer(context.fitter, fit)
     predicted = np.concatenate(context.judge.predict(fit.hypothesis.model, context.recordings))
-    without = {effect: search.store.without(fit, effect) for effect in fit.effects}
-    gains = {effect: evidence(without[effect], fit) for effect in fit.effects}
-    leading = max(gains, key=lambda effect: gains[effect])
     uncertain = _uncertain(context, search, fit)
     rules = context.rules.confirmation
-    least = min(rules.minor * gains[leading], rules.most_misfit)
     for effect in reversed(fit.effects):
-        reduced, gain = without[effect], gains[effect]
+        reduced = search.store.without(fit, effect)
+        gain = evidence(reduced, fit)
         change = predicted - np.concatenate(context.judge.predict(reduced.hypothesis.model, context.recordings))
         known = context.fitter.by_recording(reduced, reduced.white)
-        # An effect that gains much and does not transfer points to something else that is missing.
         if np.all(np.sqrt(np.nanmean(change**2, axis=0)) < rules.irrelevant * context.judge.noise):
             reason = "changes no prediction to speak of"
-        elif effect in uncertain and (gain < rules.most_misfit or not nonsmooth_search.is_non_smooth(fit)):
+        elif effect in uncertain and (gain < rules.certain_beside_backlash or not nonsmooth_search.is_non_smooth(fit)):
             reason = "has a size that cannot be told from zero"
         elif gain < rules.doubtful and float(np.sum(repeated.likelihoods - known)) <= 0.0:
             reason = "does not transfer to held-out recordings"
-        elif not small and gain < least and context.held_out.gain(context.fitter, repeated, reduced) < rules.visible:
-            reason = f"does not show in held-out predictions beside {leading}"
         else:
-            rival = _rival_that_transfers(context, search, fit, effect, repeated, gain, seen)
-            if rival is None:
-                continue
-            reason = "held-out recordings contradict it, and not what is in its place"
-            considered = (ConsideredEffect(effect, gain, False, reason),)
-            return confirmed(context, search, rival, small=small, seen=seen).after(considered)
+            continue
         considered = (ConsideredEffect(effect, gain, False, reason),)
         plain = search.store.with_reduced_law(fit, effect)
         worth = plain is not None and search.criteria.gains_enough(reduced, plain)
         kept = plain if plain is not None and worth else reduced
-        return confirmed(context, search, kept, small=small, seen=seen).after(considered)
+        return confirmed(context, search, kept).after(considered)
     return Chosen(fit)
 
 
@@ -162,28 +132,6 @@ def _uncertain(context: Context, search: Search, fit: Fit) -> list[str]:
         if grows and not known[grows].any():
             found.append(effect)
     return found
-
-
-def _rival_that_transfers(
-    context: Context,
-    search: Search,
-    fit: Fit,
-    effect: str,
-    repeated: Transfer,
-    gain: float,
-    seen: frozenset[frozenset[str]],
-) -> Fit | None:
-    """The fit with a close rival in the place of an effect that held-out recordings contradict; None without either."""
-    rules = context.rules.confirmation
-    if context.held_out.gain(context.fitter, repeated, search.store.without(fit, effect)) >= -rules.tolerated:
-        return None
-    error = context.held_out.error(repeated)
-    for other in search.store.replacements(fit, effect)[:RIVALS]:
-        if frozenset(other.effects) not in seen and evidence(other, fit) < rules.given_up * gain:
-            again = context.fitter.converged(context.fitter.fit(other.hypothesis, fit.levels))
-            if context.held_out.error(transfer(context.fitter, again)) < (1.0 - rules.visible) * error:
-                return again
-    return None
 
 
 def remaining(context: Context, search: Search, fit: Fit, shapes: list[Shape]) -> Rest:
@@ -238,8 +186,7 @@ def significant_residuals(
     found = residual_tests(context.by_row, fit, shapes)
     p_value = min(1.0, min(residual.p_value for residual in found) * len(shapes))
     least = _least_gains(context, fit, explained)
-    rules = context.rules.residuals
-    return _significant(found, p_value, least, rules.level_beside_effects if fit.effects else rules.level), p_value
+    return _significant(found, p_value, least, context.rules.residuals.level), p_value
 
 
 def _least_gains(context: Context, fit: Fit, explained: float) -> dict[str, float]:

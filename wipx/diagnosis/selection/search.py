@@ -251,7 +251,7 @@ class Search:
 
     def is_worth_pairing(self, current: Fit, one: Fit) -> bool:
         """Whether an effect that is not worth it alone gains enough for a second one to be sought beside it."""
-        return one.log_likelihood - current.log_likelihood >= self.rules.worth_pairing
+        return one.log_likelihood - current.log_likelihood >= self.rules.expected_share * self.rules.least_gain
 
     def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
         """The fit with two effects more of which neither is worth it alone, if the two are."""
