@@ -14,7 +14,6 @@ from wipx.core.model import Model
 from wipx.sim.tree.inverse import forces_of
 
 LEFT_OVER = 1e-8  # [N m or N] of the forces on joints without a drive
-LEAST_FORCE = 1e-6  # [N m or N] on a driven joint that nothing could balance
 
 
 @dataclass(frozen=True)
