@@ -326,9 +326,6 @@ class PlausibilityRules:
     least_motion: float = rule(
         0.005, "m or rad", "travel of a recorded robot, at least; a unit that leaves less is no mistake", JUDGEMENT, 0.0
     )
-    harmless: float = rule(
-        0.3, "logarithm", "factor below which a wrong unit makes no gross difference", JUDGEMENT, 0.0
-    )
     least_gyration: float = rule(
         0.01, "", "inertia of a body over m_b L^2, at least", "derived: bodies that people build", 0.0
     )

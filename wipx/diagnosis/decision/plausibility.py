@@ -119,7 +119,7 @@ def check_plausible(fitter: InnovationFitter, setting: Setting, nominal: Fit, be
 def mistakes(nominal: Model, rules: PlausibilityRules) -> tuple[Mistake, ...]:
     """The mistakes that are possible for a robot."""
     plant = nominal.plant
-    units = (*_units_of_columns(nominal, rules), *_zeros(plant), *_units_of_parameters(nominal, rules))
+    units = (*_units_of_columns(nominal), *_zeros(plant), *_units_of_parameters(nominal, rules))
     return (*_signs(plant), *units)
 
 
@@ -141,7 +141,7 @@ def _reversed(column: str) -> Mistake:
     return Mistake(f"sign of {column}", f"{column} reversed", remedy, columns)
 
 
-def _units_of_columns(nominal: Model, rules: PlausibilityRules) -> list[Mistake]:
+def _units_of_columns(nominal: Model) -> list[Mistake]:
     plant = nominal.plant
     found = []
     angles = [column for column in plant.coordinates if column != "x"]
@@ -154,8 +154,8 @@ def _units_of_columns(nominal: Model, rules: PlausibilityRules) -> list[Mistake]
     if "x" in plant.coordinates:
         columns = {"x": (1e-3, 0.0), "x_dot": (1e-3, 0.0)}
         found.append(Mistake("unit of x, m", "millimetres read", "write signals: {x: {column: x, unit: mm}}", columns))
-    radius = nominal.parameters.get("wheel_radius", 1.0)
-    if "x" in plant.coordinates and abs(np.log(radius)) > rules.harmless:
+    radius = nominal.parameters.get("wheel_radius")
+    if "x" in plant.coordinates and radius is not None:
         remedy = f"divide by the wheel radius with signals: {{u: {{column: u, scale: {1.0 / radius:.5g}}}}}"
         found.append(Mistake("unit of u, N", "a motor torque in N m read", remedy, {"u": (1.0 / radius, 0.0)}))
     return found
