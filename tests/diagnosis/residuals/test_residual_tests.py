@@ -97,6 +97,20 @@ def test_what_the_steps_of_the_simulator_err_is_not_left_over(monkeypatch: pytes
     assert min(one.p_value for one in found) * len(found) < 1e-6
 
 
+def test_steps_that_err_less_than_noise_explain_nothing(monkeypatch: pytest.MonkeyPatch, fresh_seed: int):
+    case = Bench(nominal_model("linear_axis"), recorded("linear_axis", {}, fresh_seed, count=1), {})
+    fit = case.fit()
+    shapes = shapes_of(case.fitter, fit)
+
+    def p_values(change: np.ndarray) -> list[float]:
+        monkeypatch.setattr(InnovationFitter, "error_of_steps", lambda self, fit: change)
+        return [one.p_value for one in residual_tests(case.fitter, fit, shapes)]
+
+    white = fit.white.ravel()
+    drifting = np.cumsum(white) / np.sqrt(len(white))  # goes with the noise and with slow forces
+    assert p_values(1e-6 * drifting) == pytest.approx(p_values(np.zeros_like(white)), rel=1e-6)
+
+
 def test_the_found_effect_leaves_nothing_over():
     truth = {"translation/coulomb": {"F_c": 0.5}}
     answer = bench("wip", truth, seed=8).diagnosed()

@@ -91,15 +91,32 @@ def shapes_of(fitter: InnovationFitter, fit: Fit) -> list[Shape]:
 def residual_tests(fitter: InnovationFitter, fit: Fit, shapes: list[Shape]) -> list[Residual]:
     """What each family of forces would add to a fit, the most significant first.
 
-    The direction in which the simulator's steps err counts as explained.
+    The simulator's steps err by about what halving them changes: errors along that direction are expected, as far as
+    it goes.
     """
     white = fit.white.ravel()
-    own = np.column_stack([fit.jacobian[: white.size], fitter.error_of_steps(fit)])
-    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0]
+    own = fit.jacobian[: white.size]
+    basis = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))[0] if own.size else own
+    basis = np.column_stack([basis, _expected(fitter.error_of_steps(fit), basis)])
     left = white - basis @ (basis.T @ white)
     labels = np.repeat(stretches(fitter.data)[:, None], fit.white.shape[1], axis=1).ravel()
     found = [_tested(fitter, fit, shape, basis, left, labels) for shape in shapes]
     return sorted(found, key=lambda residual: residual.p_value)
+
+
+def _expected(change: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """A direction that makes unit noise white again which has, beside, a multiple of a change: 1, give or take 1.
+
+    Args:
+        change: Shape (N,).
+        basis: Orthonormal directions that are taken out already, shape (N, D).
+
+    Returns:
+        Shape (N,); the more of it is taken out, the more the change stands out of the noise.
+    """
+    change = change - basis @ (basis.T @ change)
+    squared = float(change @ change)
+    return change * np.sqrt((1.0 - 1.0 / np.sqrt(1.0 + squared)) / max(squared, 1e-300))
 
 
 def _tested(
