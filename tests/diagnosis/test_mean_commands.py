@@ -9,8 +9,10 @@ from identify.emulated_robot import nominal_model
 
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
+from wipx.core.results import HORIZON
 from wipx.diagnosis.candidates.screening import candidates_of_effect
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.identify.evaluation import Judge
 from wipx.sim.inputs import Inputs
 
 NOISE = 1.5  # [N] of the single commands, as a controller makes of noisy rates
@@ -62,3 +64,14 @@ def test_a_dead_zone_is_looked_for_with_commands_that_scatter(fresh_seed: int):
     best = max(starts, key=lambda start: start.gain)
     # Taken for the commands themselves, their means would give little more than half of it.
     assert best.values["actuator/dead_zone.band"] == pytest.approx(0.8, rel=0.25)
+
+
+@pytest.mark.parametrize("effect", LIMITS)
+def test_predictions_know_that_single_commands_scatter(effect: str, fresh_seed: int):
+    recordings = noisily_driven(effect, fresh_seed)
+    robot = nominal_model("linear_axis").with_effects({effect: LIMITS[effect], "environment/spring": SPRING})
+    noise = np.full(1, 1e-5)
+    knowing = Judge(SIMULATOR, noise, HORIZON).compare(robot, robot, recordings, held_out=True)[0].completed["x"]
+    held = tuple(replace(recording, periods=1) for recording in recordings)  # as if means were the commands
+    taken_for_single = Judge(SIMULATOR, noise, HORIZON).compare(robot, robot, held, held_out=True)[0].completed["x"]
+    assert knowing < 0.6 * taken_for_single

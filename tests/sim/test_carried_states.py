@@ -29,7 +29,7 @@ def test_a_replay_goes_on_from_what_joints_carry_as_if_it_had_never_stopped(memo
     commands = np.vstack([sines(t, 6.0), [[0.0]]])
     batch, whole = ModelBatch(model), Inputs.of([t], [commands], [0])
     start = np.array(LIVELY["wip"])[:, None, None]
-    idle = Observer(np.zeros((61, 2, 1)), np.zeros((1, 61, 1, 4, 2)), np.zeros(1, dtype=np.int64), np.zeros((1, 1)))
+    idle = Observer(np.zeros((61, 2, 1)), np.zeros((1, 61, 1, 4, 2)), np.zeros(1, dtype=np.int64))
     run = SIMULATOR.follow(batch, whole, start, replace(idle, kept=(ROWS, np.zeros(3, dtype=np.int64))))
     assert run.carried is not None
     rest = Inputs.of([t[row:] for row in ROWS], [commands[row:] for row in ROWS], [0, 0, 0])

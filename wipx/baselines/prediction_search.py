@@ -110,7 +110,14 @@ def _chosen(windows: Windows, index: np.ndarray) -> Windows:
     inputs = windows.inputs
     ramps = None if inputs.ramps is None else inputs.ramps[:, :, index]
     return Windows(
-        Inputs(inputs.t[:, index], inputs.commands[:, :, index], inputs.first[index], inputs.last[index], ramps),
+        replace(
+            inputs,
+            t=inputs.t[:, index],
+            commands=inputs.commands[:, :, index],
+            first=inputs.first[index],
+            last=inputs.last[index],
+            ramps=ramps,
+        ),
         windows.recorded[:, :, index],
         windows.known[:, index],
         windows.predicted[:, index],

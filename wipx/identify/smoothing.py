@@ -23,7 +23,7 @@ from wipx.core.recording import Recording
 from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import Linearisation, linearise_along
 from wipx.identify.sensors import delays_of, scales_of, true_states
-from wipx.identify.unlogged_commands import jolts
+from wipx.identify.unlogged_commands import command_spread, jolts
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
@@ -184,8 +184,7 @@ class Smoother:
     ) -> Rollouts:
         """What P models, each kept close by one of the filters, show at every row before they are corrected there."""
         gains = filters[0].corrections[None] if len(filters) == 1 else np.stack([f.corrections for f in filters])
-        spread = np.zeros((batch.size, len(self.plant.commands)))
-        observer = Observer(self._measured, gains, group, spread, kept=kept)
+        observer = Observer(self._measured, gains, group, kept=kept)
         return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
 
     def filtered(self, model: Model, bandwidth: np.ndarray) -> Filter:
@@ -225,6 +224,7 @@ class Smoother:
             [r.stack(self.plant.commands) for r in self.recordings],
             [0] * len(self.recordings),
             tuple(r.periods for r in self.recordings),
+            command_spread(self.recordings, self.plant),
         )
 
     @cached_property

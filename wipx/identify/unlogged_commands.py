@@ -3,6 +3,7 @@
 import numpy as np
 
 from wipx.core.model import Model
+from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.identify.linearisation import answers_to_commands
 from wipx.sim.inputs import Inputs
@@ -13,6 +14,19 @@ def noise_of_means(recording: Recording, command: str) -> float:
     if len(recording) < 5:
         return 0.0
     return 1.4826 * float(np.median(np.abs(np.diff(recording[command], 4)))) / np.sqrt(70.0)
+
+
+def command_spread(recordings: tuple[Recording, ...], plant: Plant) -> np.ndarray:
+    """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,).
+
+    The noise of n commands' mean is sqrt(n) times less than theirs, and a triangular distribution is sqrt(6) standard
+    deviations wide to either side. Zero where every command is in the log.
+    """
+    found = []
+    for name in plant.commands:
+        scaled = [np.sqrt(r.periods - 1) * noise_of_means(r, name) for r in recordings]
+        found.append(np.sqrt(6.0) * float(np.median(scaled)))
+    return np.array(found)
 
 
 def jolts(model: Model, recordings: tuple[Recording, ...], inputs: Inputs, coordinates: np.ndarray) -> np.ndarray:

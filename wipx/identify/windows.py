@@ -12,6 +12,7 @@ import numpy as np
 from wipx.core.errors import InputError
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
+from wipx.identify.unlogged_commands import command_spread
 from wipx.sim.inputs import Inputs
 
 FIRST_START = 0.5  # [s] after the first row, contract section 4
@@ -107,6 +108,7 @@ def cut(
         [recordings[p.recording].stack(plant.commands)[p.rows] for p in pieces],
         [p.first for p in pieces],
         tuple(recordings[p.recording].periods for p in pieces),
+        command_spread(recordings, plant),
     )
     shape = (len(inputs.t), len(pieces))
     recorded = np.zeros((shape[0], len(plant.coordinates), shape[1]))

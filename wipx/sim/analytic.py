@@ -39,8 +39,7 @@ class Observer:
         gains: Shape (groups, K + 1, R, states, channels), from channels to states; zero where nothing was measured.
             States are coordinates, then rates, then accelerations that the observer adds to the model's, if it does.
         group: Which of the gains each model has, shape (P,).
-        spread: Half width by which single commands scatter about the mean that the log has, shape (P, inputs)
-            [N or N m]; thresholds of the actuator answer to single commands.
+        spread: As `Inputs.spread`, but of each model, shape (P, inputs) [N or N m]; None for that of the inputs.
         reports: Whether to tell the forces of the drives.
         kept: Rows (W,) of recordings (W,) at which to tell what joints carry from step to step; None for none.
     """
@@ -48,7 +47,7 @@ class Observer:
     recorded: np.ndarray
     gains: np.ndarray
     group: np.ndarray
-    spread: np.ndarray
+    spread: np.ndarray | None = None
     reports: bool = False
     kept: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -113,6 +112,8 @@ class AnalyticSimulator:
             run.report()
         if observer.kept is not None:
             run.keep(*observer.kept)
+        if observer.spread is not None:
+            run.coefficients.joints[run.layout.driven, R.SPREAD] = observer.spread.T
         run.advance(run.layout.states(initial), 0, run.layout.rows, observer=observer)
         return run.rollouts(inputs.commands[:, :, None, :])
 
@@ -175,6 +176,7 @@ class _Run:
         self.batch = batch
         self.simulator = simulator
         self.coefficients = coefficients(batch, simulator.smoothing)
+        self.coefficients.joints[:, R.SPREAD] = self.layout.spread()
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)
         self.out = np.empty((self.layout.rows + 1, 2 * self.layout.width, self.layout.lanes))
@@ -218,9 +220,6 @@ class _Run:
         loop = loop or self.layout.open_loop()
         measured, corrections, group = self._observed(observer)
         led, until = self.layout.led(path)
-        spread = np.zeros((self.layout.width, self.batch.size))
-        if observer is not None:
-            spread[self.layout.driven] = observer.spread.T
 
         def work(begin: int, end: int) -> None:
             rollout(
@@ -233,7 +232,6 @@ class _Run:
                 self.inputs.t,
                 commands,
                 ramps,
-                spread,
                 self.row_steps,
                 self.substeps,
                 per_lane,

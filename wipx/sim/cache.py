@@ -125,7 +125,9 @@ def settled(kernel: Any, *arguments: Any) -> Any:
 
 
 def is_kept(kernel: Any) -> bool:
-    """Whether machine code of a kernel is on the disk."""
+    """Whether machine code of a kernel is on the disk, or none is wanted (NUMBA_DISABLE_JIT)."""
+    if not hasattr(kernel, "stats"):
+        return True
     return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
 
 

@@ -20,7 +20,5 @@ def compile_filters_meanwhile() -> None:
     """Say that code must be compiled, and have the filters compiled, if the simulator is about to be; once."""
     if not is_kept(rollout):
         print("compiling the simulator and the filters, once; this takes up to a minute", file=sys.stderr)
-        with suppress(
-            OSError
-        ):  # where no process may be started, filters are compiled one by one, when they are needed
+        with suppress(OSError):  # where no process may be started, filters are compiled when they are needed
             begun.append(subprocess.Popen(FILTERS, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))

@@ -1,6 +1,6 @@
 """Inputs of rollouts: windows of time and command, side by side in one array."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ class Inputs:
         last: Last row of each window, shape (R,).
         ramps: By how much the command changes along each row about its mean, shape (K, inputs, R); None
             where commands are held.
+        spread: Half width by which single commands scatter about the mean of a row, shape (inputs,); thresholds of the
+            actuator answer to single commands. None where every command is in the log.
     """
 
     t: np.ndarray
@@ -26,6 +28,7 @@ class Inputs:
     first: np.ndarray
     last: np.ndarray
     ramps: np.ndarray | None = None
+    spread: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         # The kernel is compiled anew for every layout in memory.
@@ -38,6 +41,7 @@ class Inputs:
         commands: list[np.ndarray],
         first: list[int],
         periods: tuple[int, ...] | None = None,
+        spread: np.ndarray | None = None,
     ) -> "Inputs":
         """Windows from one array of times (rows,) and commands (rows, inputs) each.
 
@@ -47,6 +51,7 @@ class Inputs:
             first: Row from which each window is integrated.
             periods: Commands of the controller per row of each window, whose mean the log has; None for
                 one. Their course is then taken for a straight line between the neighbouring rows.
+            spread: How single commands scatter about that mean, shape (inputs,); None for not at all.
         """
         rows = max(len(t) for t in times)
         windows = len(times)
@@ -63,7 +68,7 @@ class Inputs:
             for r, (window_t, window_u) in enumerate(zip(times, commands, strict=True)):
                 ramps[: len(window_t) - 1, :, r] = _ramps(window_t, window_u, periods[r])
         last = np.array([len(x) - 1 for x in times], dtype=np.int64)
-        return cls(t, u, np.array(first, dtype=np.int64), last, ramps)
+        return cls(t, u, np.array(first, dtype=np.int64), last, ramps, spread)
 
     @classmethod
     def regular(cls, duration: float, rate: float, inputs: int, windows: int = 1) -> "Inputs":
@@ -91,7 +96,8 @@ class Inputs:
         """The same windows cut after row `last` (R,) each."""
         rows = int(last.max()) + 1
         ramps = None if self.ramps is None else self.ramps[: rows - 1]
-        return Inputs(self.t[:rows], self.commands[: rows - 1], self.first, np.minimum(self.last, last), ramps)
+        last = np.minimum(self.last, last)
+        return replace(self, t=self.t[:rows], commands=self.commands[: rows - 1], last=last, ramps=ramps)
 
 
 def _ramps(t: np.ndarray, commands: np.ndarray, periods: int) -> np.ndarray:

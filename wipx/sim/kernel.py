@@ -185,7 +185,6 @@ def rollout(
     t_rows,
     u_rows,
     ramps,
-    spread,
     row_steps,
     substeps,
     per_lane,
@@ -226,7 +225,6 @@ def rollout(
         t_rows: Time of each row, shape (K + 1, R) [s].
         u_rows: Command of each joint, shape (K, N, lanes) if `per_lane` (written in closed loop), else (K, N, R).
         ramps: Change of each command along a row, shape (K, N, R); else (1, N, 1).
-        spread: Half width of each joint's single commands about their mean, shape (N, P).
         row_steps: Length of the steps from each row to the next, shape (K, R) [s].
         substeps: Their number, shape (K, R); 0 holds the state.
         per_lane: Whether every lane has commands of its own.
@@ -273,7 +271,6 @@ def rollout(
                     B[j, i * W + w] = blocks[j, i, lane // windows]
                 for i in range(R.STATES):
                     B[j, i * W + w] = states[j, i, lane]
-                B[j, R.SPREAD * W + w] = spread[j, lane // windows]
         for k in range(first_row, last_row):
             if k < len(path):
                 guide(B, lanes, k, lane0, count, path, until)

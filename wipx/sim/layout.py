@@ -119,6 +119,13 @@ class Layout:
         ramps[:, self.driven] = self.inputs.ramps
         return ramps
 
+    def spread(self) -> np.ndarray:
+        """Half width by which single commands scatter about the mean that the log has, shape (N, 1)."""
+        spread = np.zeros((self.width, 1))
+        if self.inputs.spread is not None:
+            spread[self.driven, 0] = self.inputs.spread
+        return spread
+
     def block(self, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Room for a block of lanes of a robot with so many rows: A, lanes, pointers and counts of `rollout`."""
         room = np.zeros((self.width * R.BLOCK + rows) * R.W)

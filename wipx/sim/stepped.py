@@ -171,6 +171,7 @@ class _Run:
         self.inputs = inputs
         self.layout = Layout(batch.model.plant, batch.size, inputs)
         self.coefficients = coefficients(batch, simulator.smoothing)
+        self.coefficients.joints[:, R.SPREAD] = self.layout.spread()
         self.coefficients.on[R.ON_ENGINE] = True
         self.substeps = inputs.substeps(simulator.step)
         self.row_steps = np.diff(inputs.t, axis=0) / np.maximum(self.substeps, 1)

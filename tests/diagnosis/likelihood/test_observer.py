@@ -283,8 +283,7 @@ def test_following_without_gains_is_replaying(kind: str):
     rows, recordings = case.data.rows.shape
     start = np.full((2 * joints, 1, recordings), 0.01)
     idle = np.zeros((1, rows, recordings, 2 * joints, 2 * joints))
-    calm = np.zeros((1, len(case.nominal.plant.commands)))
-    observer = Observer(case.data.measured, idle, np.zeros(1, dtype=np.int64), calm)
+    observer = Observer(case.data.measured, idle, np.zeros(1, dtype=np.int64))
     followed = SIMULATOR.follow(batch, case.data.inputs, start, observer)
     replayed = SIMULATOR.replay(batch, case.data.inputs, start)
     np.testing.assert_array_equal(followed.coordinates, replayed.coordinates)
@@ -296,7 +295,7 @@ def test_full_gains_put_the_state_on_the_recording():
     rows, recordings = case.data.rows.shape
     follow_x = np.zeros((1, rows, recordings, 2, 2))
     follow_x[..., 0, 0] = 1.0
-    observer = Observer(case.data.measured, follow_x, np.zeros(1, dtype=np.int64), np.zeros((1, 1)))
+    observer = Observer(case.data.measured, follow_x, np.zeros(1, dtype=np.int64))
     start = np.zeros((2, 1, recordings))
     shown = SIMULATOR.follow(ModelBatch(case.nominal), case.data.inputs, start, observer)
     ahead = np.diff(shown.coordinates[:, 0, 0], axis=0)

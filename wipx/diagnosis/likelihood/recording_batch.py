@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.identify.unlogged_commands import noise_of_means
+from wipx.identify.unlogged_commands import command_spread
 from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
@@ -107,16 +107,8 @@ class RecordingBatch:
 
     @cached_property
     def command_spread(self) -> np.ndarray:
-        """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,).
-
-        The noise of n commands' mean is sqrt(n) times less than theirs, and a triangular distribution is sqrt(6)
-        standard deviations wide to either side.
-        """
-        found = []
-        for name in self.plant.commands:
-            scaled = [np.sqrt(r.periods - 1) * noise_of_means(r, name) for r in self.recordings]
-            found.append(np.sqrt(6.0) * float(np.median(scaled)))
-        return np.array(found)
+        """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,)."""
+        return command_spread(self.recordings, self.plant)
 
     @cached_property
     def surprises(self) -> np.ndarray:
