@@ -10,6 +10,7 @@ from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.core.results import FitErrors, Trace
+from wipx.identify.noise import LastingNoise
 from wipx.identify.prediction import DIVERGED
 from wipx.identify.smoothing import BANDWIDTHS, Smoother
 from wipx.identify.starts import Starts, starts_of
@@ -21,6 +22,7 @@ TRIAL = 0.25  # [s] between the predictions by which filters are compared
 RIGHT = 3.0  # [rad/s] bandwidth of the filter that follows a right model
 LEARNT = 1.5  # [s] of trials before which no filter is preferred to the usual one
 USUAL = 3  # filter from which a prediction starts before any trial, among `BANDWIDTHS`
+COURSES = 30  # of noise that lasts, by which its part of a floor is simulated
 REMEMBERED = 8  # answers that may be asked for again
 
 Answer = TypeVar("Answer")
@@ -40,12 +42,14 @@ class Judge:
         horizon: Length of a prediction [s].
         bandwidths: Of the filter for models that have none of their own, by coordinate [rad/s]; None for those that
             learn it.
+        lasting: Noise of the sensors that lasts, beside the white one; None for none.
     """
 
     simulator: Simulator
     noise: np.ndarray
     horizon: float
     bandwidths: Mapping[str, float] | None = None
+    lasting: LastingNoise | None = None
     _smoothers: list[Smoother] = field(default_factory=list, compare=False, repr=False)
     _answers: list[tuple[Any, Any]] = field(default_factory=list, compare=False, repr=False)
 
@@ -72,7 +76,14 @@ class Judge:
     def _once(self, answer: Callable[[], Answer], recordings: tuple[Recording, ...], *question: Any) -> Answer:
         """An answer about recordings, computed unless it is one of the latest."""
         self._smoother(question[0], recordings)  # keeps the recordings: their identities stay theirs
-        asked = (self.simulator, self.horizon, self.bandwidths, [id(recording) for recording in recordings], *question)
+        asked = (
+            self.simulator,
+            self.horizon,
+            self.bandwidths,
+            self.lasting,
+            [id(recording) for recording in recordings],
+            *question,
+        )
         known = next((found for other, found in self._answers if other == asked), None)
         if known is None:
             known = answer()
@@ -191,10 +202,15 @@ class Judge:
         rows = windows.row + starts.until
         bandwidth = np.full(len(self.noise), RIGHT)
         places = smoother.places(rows, windows.recording, rows)
-        covariance = smoother.filtered(model, bandwidth).spread(places)
+        followed = smoother.filtered(model, bandwidth)
+        covariance, variance = followed.spread(places), self.noise**2
+        if self.lasting is not None:
+            drawn = smoother.drawn(self.lasting, COURSES) / followed.scale[:, None]
+            covariance += followed.spread_by(drawn, places)
+            variance = variance + np.square(self.lasting.deviations)
         factors = np.linalg.cholesky(covariance + 1e-18 * np.eye(covariance.shape[1]))
         base = self._replayed(model, starts, 1)
-        variance = np.zeros_like(base[:, :, 0]) + (self.noise**2)[:, None]
+        variance = np.zeros_like(base[:, :, 0]) + variance[:, None]
         for i in range(factors.shape[2]):
             states = starts.states.copy()
             states[starts.until, :, 0, np.arange(windows.count)] += factors[:, :, i]

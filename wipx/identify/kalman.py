@@ -94,6 +94,24 @@ class Filter:
         _smooth(self.along, self._closed, told, *places, prior, surprises, found)
         return found
 
+    def spread_by(self, noise: np.ndarray, places: Places) -> np.ndarray:
+        """Covariance of coordinates and rates at some places by noise of the sensors, shape (W, 2 joints, 2 joints).
+
+        Args:
+            noise: N courses of it, shape (K + 1, R, joints, N).
+            places: W of them.
+        """
+        rows, recordings, joints, count = noise.shape
+        size, state = 2 * joints, np.zeros((recordings, 3 * joints, count))
+        prior, surprises = np.empty((rows, recordings, size, count)), np.empty_like(noise)
+        for k in range(rows):
+            shown = state[:, :joints] - self.late[:, None] * state[:, joints:size]
+            prior[k], surprises[k] = state[:, :size], noise[k] - shown
+            if k + 1 < rows:
+                state = self.along.moves[k + 1] @ (state + self.along.gains[k] @ surprises[k])
+        moved = self.smoothed(places, prior, surprises)
+        return moved @ np.swapaxes(moved, 1, 2) / count
+
     def spread(self, places: Places) -> np.ndarray:
         """Covariance of coordinates and rates at some places, shape (W, 2 joints, 2 joints).
 
@@ -133,7 +151,7 @@ def gains_along(
         rates: Variance by which each acceleration wanders in each filter, shape (joints,) [(m or rad)^2/s^5].
         late: Delay of each sensor, shape (joints,) [s].
     """
-    moves = _moves(linear.a, linear.place, t, last)
+    moves = transitions_along(linear, t, last)
     n, found = 3 * len(late), []
     for rate in rates:
         gains = np.zeros((*t.shape, n, len(late)))
@@ -142,6 +160,17 @@ def gains_along(
         _filter(moves, t, last, sensor**2, rate, late, jolts, gains, covariance, innovation)
         found.append(Gains(moves, gains, covariance, innovation))
     return found
+
+
+def transitions_along(linear: Linearisation, t: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Transitions of coordinates, rates and accelerations to every row from the one before, shape (K + 1, R, n, n).
+
+    Args:
+        linear: The body along R recordings.
+        t: Times of the rows, shape (K + 1, R) [s].
+        last: Last row of each recording, shape (R,).
+    """
+    return _moves(linear.a, linear.place, t, last)
 
 
 @cached_for(floats(3), integers(2), floats(2), integers(1))

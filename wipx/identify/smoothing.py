@@ -22,6 +22,7 @@ from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import Linearisation, linearise_along
+from wipx.identify.noise import LastingNoise
 from wipx.identify.sensors import delays_of, scales_of, true_states
 from wipx.identify.unlogged_commands import command_spread, jolts
 from wipx.identify.windows import LOOK_AHEAD
@@ -186,6 +187,10 @@ class Smoother:
         gains = filters[0].corrections[None] if len(filters) == 1 else np.stack([f.corrections for f in filters])
         observer = Observer(self._measured, gains, group, kept=kept)
         return self.simulator.follow(batch, self._inputs, self._first_states(batch), observer)
+
+    def drawn(self, noise: LastingNoise, count: int) -> np.ndarray:
+        """Courses of a sensor noise that lasts along the recordings, shape (K + 1, R, joints, count)."""
+        return noise.drawn(self._inputs.t, count)
 
     def filtered(self, model: Model, bandwidth: np.ndarray) -> Filter:
         """The filter of a model, of bandwidths (joints,) [rad/s]."""

@@ -35,7 +35,7 @@ def _stays(errors: FitErrors) -> str:
     over = f"predictions over {errors.horizon:g} s err"
     if errors.times_the_floor <= NEARLY:
         return f"{over} as little as sensor noise lets them"
-    return f"{over} {compact(errors.times_the_floor, 2)} times as much as white sensor noise makes them"
+    return f"{over} {compact(errors.times_the_floor, 2)} times as much as sensor noise makes them"
 
 
 def _by_kind(effects: Sequence[FoundEffect]) -> list[list[FoundEffect]]:

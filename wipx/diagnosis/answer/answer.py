@@ -40,7 +40,7 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     """Everything a person wants to know."""
     nominal, fit, rules = context.setting.nominal, rest.fit, context.rules
     repeated = transfer(context.fitter, fit)
-    judge = context.judge
+    judge = context.judge_of(fit)
     trusted = judge.tuned(nominal, context.recordings)
     # where nothing is named, predictions learn how far to trust the model, as those of the nominal one do
     model = replace(fit.hypothesis.model, bandwidths=(judge.bandwidths or {}) if fit.effects else nominal.bandwidths)

@@ -183,7 +183,7 @@ class Screening:
         plant = self.setting.nominal.plant
         j = plant.joints.index(plant.joint_at(_site(name)))
         seen, trust = self.by_row, self.fitter.rules.trust
-        asks = seen.fitter.asks_for_force(seen.fit.levels, self.setting.scales)
+        asks = seen.fitter.asks_for_force(seen.fit.levels.force, self.setting.scales)
         return bool(seen.foretold[j] <= trust.foretold and not asks[j])
 
     def _compared(self, name: str, atoms: np.ndarray) -> list[Candidate]:

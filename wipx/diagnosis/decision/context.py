@@ -1,6 +1,6 @@
 """What all stages of a diagnosis share: the recordings, what fits models to them, and what judges predictions."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from wipx.diagnosis.likelihood.held_out import HeldOut
 from wipx.diagnosis.likelihood.hypothesis import Setting
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
+from wipx.diagnosis.likelihood.lasting_noise import NoiseSources, noise_sources
 from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.rules import Rules
@@ -48,6 +49,7 @@ class Context:
     recordings: tuple[Recording, ...]
     several: bool = True
     rate_is_known: bool = False
+    _sources: list[tuple[Fit, NoiseSources]] = field(default_factory=list, compare=False, repr=False)
 
     @classmethod
     def of(
@@ -102,9 +104,8 @@ class Context:
         """Whether the laws of a fit hold, and not only nearly.
 
         Row by row they ask for no forces but theirs: what a law misses, an observer takes for noise of the forces. And
-        the fit predicts like a right model: at the floor, or well from states estimated with trust in it. A sensor's
-        noise that lasts makes errors larger than the floor, which knows of white noise only; but a right model then
-        predicts about as well from a filter that trusts it as from any other.
+        the fit predicts like a right model: at the floor, or about as well from a filter that trusts it as from any
+        other.
         """
         if not self.is_quiet(fit):
             return False
@@ -116,7 +117,7 @@ class Context:
         if self.data.plant.tree is not None:  # a slow filter loses the fast motion of an arm, however right its model
             return True
         trusting = dict.fromkeys(self.data.plant.coordinates, RIGHT)
-        judge = replace(self.judge, bandwidths=trusting)
+        judge = replace(self.judge_of(fit), bandwidths=trusting)
         others = judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0].completed
         return all(others[name] <= self.rules.trust.distrusted * error for name, error in errors.completed.items())
 
@@ -127,10 +128,9 @@ class Context:
         observer takes its errors for forces on the joint.
         """
         plant = self.data.plant
-        by_row, seen = self.fitter.seen_by_row(fit)
         swinging = {plant.joint_at(name.partition("/")[0]) for name in fit.effects if kind_of(name).scan == SWINGING}
         asked = np.array([joint not in swinging for joint in plant.joints])
-        return not np.any(asked & by_row.asks_for_force(seen.levels, self.setting.scales))
+        return not np.any(asked & self.by_row.asks_for_force(self.noise_of(fit).force, self.setting.scales))
 
     def holds_somewhere(self, fit: Fit) -> bool:
         """Whether the laws of a fit leave some joint no error that lasts."""
@@ -140,15 +140,15 @@ class Context:
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors. Where earlier innovations foretell a share f of the variance
-        of later ones, it may last: then it is 1 / sqrt(1 - f) times as large as white noise. Random forces excuse
-        nothing: they leave innovations white.
+        The worst is first. Noise is that of the sensors. On a tree it may last where earlier innovations foretell a
+        share f of the variance of later ones: then it is 1 / sqrt(1 - f) times as large as white noise. Random forces
+        excuse nothing: they leave innovations white.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
         errors, foretold = self.errors(fit), by_row.foretold(seen)
         floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
-        noise = floor / np.sqrt(np.clip(1.0 - foretold, 1e-12, 1.0))
+        noise = floor if self.data.plant.tree is None else floor / np.sqrt(np.clip(1.0 - foretold, 1e-12, 1.0))
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
         rules = self.rules.trust  # noise that lasts puts a right model far off where motion is unstable, not beyond
         wrong = (times > rules.far_off * rules.distrusted) & (foretold > rules.foretold)
@@ -163,7 +163,24 @@ class Context:
 
     def errors(self, fit: Fit) -> FitErrors:
         """Errors of the nominal model and of a fit on the recordings."""
-        return self.judge.compare(self.setting.nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
+        judge, nominal = self.judge_of(fit), self.setting.nominal
+        return judge.compare(nominal, fit.hypothesis.model, self.recordings, held_out=False)[0]
+
+    def judge_of(self, fit: Fit) -> Judge:
+        """Judges predictions by the noise that sensors have if a fit is right."""
+        return replace(self.judge, lasting=self.noise_of(fit).lasting)
+
+    def noise_of(self, fit: Fit) -> NoiseSources:
+        """What noise a fit leaves; on a tree none is looked for that lasts."""
+        known = next((sources for other, sources in self._sources if other is fit), None)
+        if known is None:
+            by_row, seen = self.fitter.seen_by_row(fit)
+            lasts = by_row.foretold(seen) > self.rules.trust.foretold
+            known = NoiseSources(seen.levels.force, None)
+            if self.data.plant.tree is None and np.any(lasts):
+                known = noise_sources(by_row.innovations_model, seen, lasts)
+            self._sources.append((fit, known))
+        return known
 
     @property
     def rules(self) -> Rules:

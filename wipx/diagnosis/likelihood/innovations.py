@@ -128,15 +128,15 @@ class InnovationFitter(Fitter):
             return 0.0
         return float(np.sqrt(max(2.0 * lead / overstated, 0.0)))
 
-    def asks_for_force(self, levels: NoiseLevels, scales: Mapping[str, Scales]) -> np.ndarray:
+    def asks_for_force(self, force: np.ndarray, scales: Mapping[str, Scales]) -> np.ndarray:
         """On which joints the observer asks for forces beside those of all laws, shape (joints,).
 
         Args:
-            levels: Noise of a fit.
+            force: Standard deviations of white forces that a fit leaves, shape (joints,), spectral.
             scales: Characteristic sizes by site.
         """
         usual = np.array([scales[site].force for site in self.data.plant.joints])
-        return levels.force > self.rules.trust.quiet * usual
+        return force > self.rules.trust.quiet * usual
 
     def foretold(self, fit: Fit) -> np.ndarray:
         """Share of the variance of each coordinate's innovations that earlier ones foretell, shape (joints,).
