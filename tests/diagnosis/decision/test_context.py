@@ -41,7 +41,8 @@ def test_a_model_whose_misfit_looks_like_noise_that_lasts_is_not_trusted(fresh_s
         context.fitter.fit(Hypothesis.of(case.setting, effects, friction), levels, steps=0)
         for effects in ((), ("translation/coulomb",))
     )
-    assert context.is_quiet(without)  # the noise of the sensor takes it all
+    assert without.levels.force[0] == levels.force[0]  # the noise of the sensor takes it all
+    assert not context.is_quiet(without)
     assert context.unruly_joints(without) == ("translation",)
     assert not context.holds_somewhere(without)
     assert not context.is_trusted(without)
@@ -56,7 +57,6 @@ def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed:
     context = Context.of(recordings, case.setting, SIMULATOR, USUAL)
     fit = context.fitter.converged(context.fitter.fit(Hypothesis.of(case.setting, (), {}), context.first_levels))
     assert context.by_row.foretold(fit)[0] > USUAL.trust.foretold
-    assert context.errors(fit).times_the_floor > USUAL.trust.near_floor
     assert context.unruly_joints(fit) == ()
     assert context.is_trusted(fit)
 
