@@ -27,6 +27,8 @@ FORGOTTEN = 0.01  # share of a sensor's noise that may be left after a predictio
 LONGEST = HORIZON / -np.log(FORGOTTEN)  # [s] correlation time
 USUAL_TIME = 0.03  # [s] from which its search starts
 REACH = 12.0  # natural logarithms by which a level may differ from where its search starts
+LEAST = 1e-300  # of a level, whose logarithm is searched
+AT_BOUND = 0.99  # share of the longest time from which a search counts as stopped by it
 ITERATIONS = 40  # of the search, at most
 
 
@@ -46,38 +48,19 @@ class NoiseSources:
 def noise_sources(model: InnovationsModel, fit: Fit, lasts: np.ndarray) -> NoiseSources:
     """The levels of noise under which the innovations of a fit are likeliest; forces only where noise may last.
 
+    What is likeliest to last longer than a sensor's noise is a force.
+
     Args:
         model: Follows the recordings.
         fit: By its innovations.
         lasts: Which coordinates' sensors may have noise that lasts, shape (joints,).
     """
-    data, levels = model.data, fit.levels
-    lasting = np.flatnonzero(lasts)
     likelihood = _Likelihood.of(model, fit)
-    spread = np.sqrt(np.mean(likelihood.errors[:, lasting] ** 2, axis=(0, 2)))
-    begun = np.log(
-        np.concatenate([levels.force, levels.sensor[lasting], spread, np.full(len(lasting), USUAL_TIME)]) + 1e-300
-    )
-    reach = [(value - REACH, value + REACH) for value in begun[: -len(lasting)]]
-    shortest = float(data.intervals[data.intervals > 0.0].min())
-    reach += [(np.log(min(shortest, USUAL_TIME)), np.log(LONGEST))] * len(lasting)
-
-    def parts(numbers: np.ndarray) -> tuple[NoiseLevels, np.ndarray, np.ndarray]:
-        force, white, deviation, time = np.split(np.exp(numbers), np.cumsum([data.joints, len(lasting), len(lasting)]))
-        sensor, deviations, times = levels.sensor.copy(), np.zeros(data.joints), np.full(data.joints, USUAL_TIME)
-        sensor[lasting], deviations[lasting], times[lasting] = white, deviation, time
-        return NoiseLevels(force, sensor), deviations, times
-
-    ended = minimize(
-        lambda numbers: -likelihood(*parts(numbers)),
-        begun,
-        method="L-BFGS-B",
-        bounds=reach,
-        options={"maxiter": ITERATIONS},
-    )
-    found, deviations, times = parts(ended.x)
-    force = np.where(lasts, found.force, levels.force)
-    return NoiseSources(force, LastingNoise(tuple(deviations.tolist()), tuple(times.tolist())))
+    levels, lasting = likelihood.greatest(fit.levels, lasts)
+    brief = lasts & (np.array(lasting.times) < AT_BOUND * LONGEST)
+    if np.any(lasts & ~brief):
+        levels, lasting = likelihood.greatest(fit.levels, brief)
+    return NoiseSources(np.where(lasts, levels.force, fit.levels.force), lasting)
 
 
 @dataclass(frozen=True)
@@ -118,14 +101,35 @@ class _Likelihood:
                 row[size + channel] = 1.0
         return cls(model, *(np.ascontiguousarray(x) for x in (errors, corrections, moves, shown)))
 
-    def __call__(self, levels: NoiseLevels, deviations: np.ndarray, times: np.ndarray) -> float:
-        """The logarithm, up to a constant.
+    def greatest(self, start: NoiseLevels, lasts: np.ndarray) -> tuple[NoiseLevels, LastingNoise]:
+        """Levels at which it is greatest, and the noise of those sensors whose noise may last.
 
         Args:
-            levels: White noise.
-            deviations: Of the sensors' noise that lasts, shape (joints,).
-            times: Its correlation times, shape (joints,) [s].
+            start: Levels to start from.
+            lasts: Whose noise may last, shape (joints,).
         """
+        data, lasting = self.model.data, np.flatnonzero(lasts)
+        joints, count = data.joints, len(lasting)
+        spread = np.sqrt(np.mean(self.errors[:, lasting] ** 2, axis=(0, 2)))
+        sizes = np.concatenate([start.force, start.sensor[:joints], spread])
+        shortest = float(data.intervals[data.intervals > 0.0].min())
+        begun = np.log(np.concatenate([np.maximum(sizes, LEAST), np.full(count, USUAL_TIME)]))
+        reach = [(size - REACH, size + REACH) for size in begun[: len(sizes)]]
+        reach += [(np.log(min(shortest, USUAL_TIME)), np.log(LONGEST))] * count
+
+        def parts(numbers: np.ndarray) -> tuple[NoiseLevels, LastingNoise]:
+            force, white, deviation, time = np.split(np.exp(numbers), np.cumsum([joints, joints, count]))
+            deviations, times = np.zeros(joints), np.full(joints, USUAL_TIME)
+            deviations[lasting], times[lasting] = deviation, time
+            levels = NoiseLevels(force, np.concatenate([white, start.sensor[joints:]]))
+            return levels, LastingNoise(tuple(deviations.tolist()), tuple(times.tolist()))
+
+        limits = {"maxiter": ITERATIONS}
+        ended = minimize(lambda x: -self(*parts(x)), begun, method="L-BFGS-B", bounds=reach, options=limits)
+        return parts(ended.x)
+
+    def __call__(self, levels: NoiseLevels, lasting: LastingNoise) -> float:
+        """The logarithm, up to a constant, for levels of white noise and a noise that lasts."""
         data = self.model.data
         return _log_likelihood(
             self.errors,
@@ -140,8 +144,8 @@ class _Likelihood:
             self.shown,
             levels.force**2,
             levels.sensor**2,
-            deviations**2,
-            times,
+            np.square(lasting.deviations),
+            np.array(lasting.times),
         )
 
 
