@@ -157,9 +157,9 @@ def _left_over(context: Context, search: Search, fit: Fit, shapes: list[Shape], 
         return Rest(named or fit, None, p_value, named is not None, resembles, np.zeros(0))
     forces = [residual for residual in left if residual.shape.kind != "resonance"]
     if not forces:
-        if named is None and context.data.has_means:  # which feign what swings; its law does not confirm it
+        if named is None:  # noise that lasts and mean commands feign what swings; its law does not confirm it
             return Rest(fit, None, p_value, False, (), np.zeros(0))
-        named = fit if named is None else _without_superfluous(search, named)
+        named = _without_superfluous(search, named)
         return Rest(named, strongest, p_value, True, resembles, np.zeros(0))
     widest = max(forces, key=lambda residual: residual.gain)
     stood_in, spread = with_curve(context.by_row, context.setting, fit, widest)
