@@ -15,13 +15,11 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.noise import LastingNoise, sensor_noise
 from wipx.sim.inputs import Inputs
 
-ALL = np.array([True, True])
-
 
 def sources_of(case: Bench, rng: np.random.Generator) -> NoiseSources:
     """What noise is found beside the right model, if every sensor's may last."""
     fit = case.fitter.converged(case.fit())
-    return noise_sources(case.fitter.innovations_model, fit, ALL[: case.data.joints])
+    return noise_sources(case.fitter.innovations_model, fit)
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis"])

@@ -171,14 +171,21 @@ class Context:
         return replace(self.judge, lasting=self.noise_of(fit).lasting)
 
     def noise_of(self, fit: Fit) -> NoiseSources:
-        """What noise a fit leaves; on a tree none is looked for that lasts."""
+        """What noise a fit leaves.
+
+        Noise that lasts is looked for where white noise of the sensors does not make errors as large as they are, or
+        leaves forces; not on a tree.
+        """
         known = next((sources for other, sources in self._sources if other is fit), None)
         if known is None:
             by_row, seen = self.fitter.seen_by_row(fit)
-            lasts = by_row.foretold(seen) > self.rules.trust.foretold
+            nominal, model = self.setting.nominal, fit.hypothesis.model
             known = NoiseSources(seen.levels.force, None)
-            if self.data.plant.tree is None and np.any(lasts):
-                known = noise_sources(by_row.innovations_model, seen, lasts)
+            if self.data.plant.tree is None:
+                errors = self.judge.compare(nominal, model, self.recordings, held_out=False)[0]
+                large = errors.times_the_floor > self.rules.trust.near_floor
+                if large or np.any(by_row.asks_for_force(known.force, self.setting.scales)):
+                    known = noise_sources(by_row.innovations_model, seen)
             self._sources.append((fit, known))
         return known
 

@@ -45,22 +45,21 @@ class NoiseSources:
     lasting: LastingNoise | None
 
 
-def noise_sources(model: InnovationsModel, fit: Fit, lasts: np.ndarray) -> NoiseSources:
-    """The levels of noise under which the innovations of a fit are likeliest; forces only where noise may last.
+def noise_sources(model: InnovationsModel, fit: Fit) -> NoiseSources:
+    """The levels of noise under which the innovations of a fit are likeliest.
 
     What is likeliest to last longer than a sensor's noise is a force.
 
     Args:
         model: Follows the recordings.
         fit: By its innovations.
-        lasts: Which coordinates' sensors may have noise that lasts, shape (joints,).
     """
     likelihood = _Likelihood.of(model, fit)
-    levels, lasting = likelihood.greatest(fit.levels, lasts)
-    brief = lasts & (np.array(lasting.times) < AT_BOUND * LONGEST)
-    if np.any(lasts & ~brief):
+    levels, lasting = likelihood.greatest(fit.levels, np.full(model.data.joints, fill_value=True))
+    brief = np.array(lasting.times) < AT_BOUND * LONGEST
+    if not np.all(brief):
         levels, lasting = likelihood.greatest(fit.levels, brief)
-    return NoiseSources(np.where(lasts, levels.force, fit.levels.force), lasting)
+    return NoiseSources(levels.force, lasting)
 
 
 @dataclass(frozen=True)
