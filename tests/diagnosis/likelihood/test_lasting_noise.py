@@ -17,7 +17,7 @@ from wipx.sim.inputs import Inputs
 
 
 def sources_of(case: Bench, rng: np.random.Generator) -> NoiseSources:
-    """What noise is found beside the right model, if every sensor's may last."""
+    """What noise is found beside the right model."""
     fit = case.fitter.converged(case.fit())
     return noise_sources(case.fitter.innovations_model, fit)
 

@@ -174,7 +174,8 @@ class Context:
         """What noise a fit leaves.
 
         Noise that lasts is looked for where white noise of the sensors does not make errors as large as they are, or
-        leaves forces; not on a tree.
+        leaves forces; not on a tree. A joint is left the smaller of the forces with it and without, unless earlier
+        innovations foretell most of later ones: without it they may then hide any force.
         """
         known = next((sources for other, sources in self._sources if other is fit), None)
         if known is None:
@@ -185,7 +186,10 @@ class Context:
                 errors = self.judge.compare(nominal, model, self.recordings, held_out=False)[0]
                 large = errors.times_the_floor > self.rules.trust.near_floor
                 if large or np.any(by_row.asks_for_force(known.force, self.setting.scales)):
-                    known = noise_sources(by_row.innovations_model, seen)
+                    found = noise_sources(by_row.innovations_model, seen)
+                    coloured = by_row.foretold(seen) > self.rules.trust.foretold
+                    least = np.where(coloured, found.force, np.minimum(found.force, known.force))
+                    known = replace(found, force=least)
             self._sources.append((fit, known))
         return known
 
