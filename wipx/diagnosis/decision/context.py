@@ -23,6 +23,7 @@ from wipx.identify.noise import low_passed, sensor_noise
 from wipx.identify.resolution import resolving
 from wipx.sim.analytic import AnalyticSimulator
 
+MOST_JOINTS = 2  # of a robot on which noise that lasts is looked for: the work grows with the third power
 SWINGING = "springs"  # `Effect.scan` of drives that swing on a spring
 
 
@@ -140,7 +141,7 @@ class Context:
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors. On a tree it may last where earlier innovations foretell a
+        The worst is first. Noise is that of the sensors. On a robot of many joints it may last where earlier innovations foretell a
         share f of the variance of later ones: then it is 1 / sqrt(1 - f) times as large as white noise. Random forces
         excuse nothing: they leave innovations white.
         """
@@ -148,7 +149,7 @@ class Context:
         by_row, seen = self.fitter.seen_by_row(fit)
         errors, foretold = self.errors(fit), by_row.foretold(seen)
         floor = np.array([errors.noise_floor[name] for name in plant.coordinates])
-        noise = floor if self.data.plant.tree is None else floor / np.sqrt(np.clip(1.0 - foretold, 1e-12, 1.0))
+        noise = floor if self.data.joints <= MOST_JOINTS else floor / np.sqrt(np.clip(1.0 - foretold, 1e-12, 1.0))
         times = np.array([errors.completed[name] for name in plant.coordinates]) / noise
         rules = self.rules.trust  # noise that lasts puts a right model far off where motion is unstable, not beyond
         wrong = (times > rules.far_off * rules.distrusted) & (foretold > rules.foretold)
@@ -174,7 +175,7 @@ class Context:
         """What noise a fit leaves.
 
         Noise that lasts is looked for where white noise of the sensors does not make errors as large as they are, or
-        leaves forces; not on a tree. A joint is left the smaller of the forces with it and without, unless earlier
+        leaves forces; not on robots of many joints. A joint is left the smaller of the forces with it and without, unless earlier
         innovations foretell most of later ones: without it they may then hide any force.
         """
         known = next((sources for other, sources in self._sources if other is fit), None)
@@ -182,7 +183,7 @@ class Context:
             by_row, seen = self.fitter.seen_by_row(fit)
             nominal, model = self.setting.nominal, fit.hypothesis.model
             known = NoiseSources(seen.levels.force, None)
-            if self.data.plant.tree is None:
+            if self.data.joints <= MOST_JOINTS:
                 errors = self.judge.compare(nominal, model, self.recordings, held_out=False)[0]
                 large = errors.times_the_floor > self.rules.trust.near_floor
                 if large or np.any(by_row.asks_for_force(known.force, self.setting.scales)):
