@@ -14,6 +14,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.decision.context import Context
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
+from wipx.diagnosis.likelihood.lasting_noise import NoiseSources
 from wipx.diagnosis.rules import USUAL
 from wipx.sim.inputs import Inputs
 
@@ -62,7 +63,9 @@ def test_a_right_model_is_trusted_though_the_noise_of_a_sensor_lasts(fresh_seed:
 
 
 @pytest.mark.parametrize(("loud", "quiet"), [("elbow", True), ("shoulder", False)])
-def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(loud: str, quiet: bool, tmp_path: Path, fresh_seed: int):
+def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(
+    loud: str, quiet: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
+):
     spring = {"drive_inertia": 0.004, "stiffness": 9.0, "damping": 0.015}
     model = arm(tmp_path)
     case = Bench(model, (recorded(model.with_effects({SPRING: spring}), fresh_seed),), {})
@@ -70,6 +73,7 @@ def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(loud: str, quiet: 
     right = Hypothesis.of(case.setting, (SPRING,), {f"{SPRING}.{name}": value for name, value in spring.items()})
     force = case.quiet.force * np.where(np.array(model.plant.joints) == loud, 100.0, 1.0)
     fit = context.fitter.fit(right, replace(case.quiet, force=force), steps=0)
+    monkeypatch.setattr(Context, "noise_of", lambda _context, loud: NoiseSources(loud.levels.force, None))
     assert context.is_quiet(fit) is quiet
 
 

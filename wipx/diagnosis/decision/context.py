@@ -141,9 +141,9 @@ class Context:
     def unruly_joints(self, fit: Fit) -> tuple[str, ...]:
         """Joints whose laws hold nearly at best, and whose predictions err far more than noise makes them.
 
-        The worst is first. Noise is that of the sensors. On a robot of many joints it may last where earlier innovations foretell a
-        share f of the variance of later ones: then it is 1 / sqrt(1 - f) times as large as white noise. Random forces
-        excuse nothing: they leave innovations white.
+        The worst is first. Noise is that of the sensors. On a robot of many joints it may last where earlier
+        innovations foretell a share f of the variance of later ones: then it is 1 / sqrt(1 - f) times as large as white
+        noise. Random forces excuse nothing: they leave innovations white.
         """
         plant = self.data.plant
         by_row, seen = self.fitter.seen_by_row(fit)
@@ -175,8 +175,8 @@ class Context:
         """What noise a fit leaves.
 
         Noise that lasts is looked for where white noise of the sensors does not make errors as large as they are, or
-        leaves forces; not on robots of many joints. A joint is left the smaller of the forces with it and without, unless earlier
-        innovations foretell most of later ones: without it they may then hide any force.
+        leaves forces; not on robots of many joints. A joint is left the smaller of the forces with it and without,
+        unless earlier innovations foretell most of later ones: without it they may then hide any force.
         """
         known = next((sources for other, sources in self._sources if other is fit), None)
         if known is None:
