@@ -56,10 +56,10 @@ class PredictionStarts:
 
 @dataclass(frozen=True)
 class Errors:
-    """How errors of N predictions at H horizons are distributed.
+    """How the E errors of a prediction are distributed.
 
     Attributes:
-        whitening: Inverse Cholesky factor of their scale matrix, shape (H joints, H joints).
+        whitening: Inverse Cholesky factor of their scale matrix, shape (E, E).
         log_likelihood: Of the errors that it was fitted to, up to a constant.
         reported: Nothing; reported forces are no part of it.
     """
@@ -145,17 +145,16 @@ class ForecastFitter(Fitter):
 
     @property
     def blocks(self) -> np.ndarray:
-        """Number of the stretch of time of every error, shape (N, H joints)."""
+        """Number of the stretch of time of every error, shape (N, E)."""
         return self._for_every_error(self.stretches.number)
 
     @property
     def runs(self) -> np.ndarray:
-        """Number of the recording of every error, shape (N, H joints)."""
+        """Number of the recording of every error, shape (N, E)."""
         return self._for_every_error(self.predictions.recording)
 
     def _for_every_error(self, values: np.ndarray) -> np.ndarray:
-        errors = len(self.predictions.sampled) * self.data.joints
-        return np.broadcast_to(values[:, None], (len(values), errors))
+        return np.broadcast_to(values[:, None], (len(values), self.predictions.size))
 
     @property
     def is_possible(self) -> bool:
@@ -219,7 +218,8 @@ class ForecastFitter(Fitter):
             Shape (joints,), in units of the squared noise.
         """
         batch = fit.hypothesis.space.batch(self._judged_by_others(fit)[0])
-        errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)[:, :, -self.data.joints :]
+        longest = (len(self.predictions.sampled) - 1) * self.data.joints + np.arange(self.data.joints)
+        errors = self.errors_of(batch, fit.levels, fit.hypothesis.model)[:, :, longest]
         own = errors[self.stretches.part, np.arange(self.predictions.count)][self.predictions.counted]
         return np.ravel(fitted_whitening(own.T[:, :, None])[0]) ** -2.0
 
@@ -366,7 +366,7 @@ class ForecastFitter(Fitter):
         return list(np.unique(np.clip(best * factors, BANDWIDTHS[0], BANDWIDTHS[-1]), axis=0))
 
     def errors_of(self, batch: ModelBatch, levels: PredictionStarts, model: Model) -> np.ndarray:
-        """Errors in units of the sensor noise, shape (P, N, H joints); zero where a prediction does not count."""
+        """Errors in units of the sensor noise, shape (P, N, E); zero where a prediction does not count."""
         return self.predictions.errors(batch, [levels.filter])
 
     def noise_of(self, errors: np.ndarray, levels: PredictionStarts | None, model: Model) -> list[Errors]:
@@ -381,14 +381,14 @@ class ForecastFitter(Fitter):
         return [Errors(w, float(value)) for w, value in zip(whitening, likelihoods, strict=True)]
 
     def whitened(self, errors: np.ndarray, noise: Errors) -> np.ndarray:
-        """White errors, shape (P, N, H joints), half of whose sum of squares is the loss of likelihood."""
+        """White errors, shape (P, N, E), half of whose sum of squares is the loss of likelihood."""
         white = errors @ noise.whitening.T
         for group in self.predictions.groups:
             white[:, :, group] = np.sqrt(SHARE) * shrunk(white[:, :, group])
         return white
 
     def by_recording(self, fit: Fit, white: np.ndarray) -> np.ndarray:
-        """Log-likelihood of each recording, shape (R,), for white errors (N, H joints)."""
+        """Log-likelihood of each recording, shape (R,), for white errors (N, E)."""
         values = self._likelihoods(replace(fit, white=white))
         return np.bincount(self.predictions.recording, values, minlength=len(self.data.recordings))
 

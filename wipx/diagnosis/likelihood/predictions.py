@@ -13,6 +13,7 @@ import numpy as np
 from wipx.core.model import Model, ModelBatch
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON
+from wipx.diagnosis.likelihood.recorded_ways import Ways
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.identify.kalman import Filter
 from wipx.identify.smoothing import Smoother
@@ -96,12 +97,24 @@ class Predictions:
         return whole & ~np.isin(windows.recording, self.data.left_out)
 
     @cached_property
+    def ways(self) -> Ways:
+        """How far recorded rates say that joints move along each prediction."""
+        ends = start_rows(self.windows), self.sampled[-1]
+        return Ways.of(self._recordings, self.data.plant, self.windows, *ends)
+
+    @property
+    def size(self) -> int:
+        """Number of errors of a prediction E: of H joints, then of the ways by recorded rates."""
+        return len(self.sampled) * self.data.joints + len(self.ways.joints)
+
+    @cached_property
     def groups(self) -> tuple[np.ndarray, ...]:
-        """Which of the H joints errors of a prediction go with each other, indices."""
+        """Which of the errors of a prediction go with each other, indices."""
         joints, channels = self.data.joints, self.data.channels
         first = np.arange(len(self.sampled))[:, None] * joints
         own = [[channels[c] for c in group if channels[c] < joints] for group in self.data.groups]
-        return tuple((first + np.array(coordinates)).ravel() for coordinates in own)
+        ways = [first.size * joints + np.flatnonzero(np.isin(self.ways.joints, some)) for some in own]
+        return tuple(np.append(first + np.array(some), way) for some, way in zip(own, ways, strict=True))
 
     def filters(self, model: Model, bandwidths: Sequence[np.ndarray]) -> list[Filter]:
         """Filters of a model along the recordings, each of bandwidths (joints,) [rad/s]."""
@@ -112,7 +125,7 @@ class Predictions:
         return Smoother(self.simulator, self.data.plant, self._recordings, self.noise)
 
     def errors(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:
-        """Errors of P models in units of the sensor noise, shape (P, N, H joints); zero where one does not count.
+        """Errors of P models in units of the sensor noise, shape (P, N, E); zero where one does not count.
 
         Args:
             batch: The models.
@@ -120,7 +133,10 @@ class Predictions:
         """
         windows, sampled = self.windows, self.sampled
         joints, count = self.data.joints, windows.count
-        found = np.empty((batch.size, count, len(sampled) * joints))
+        found = np.empty((batch.size, count, self.size))
+        ahead = len(sampled) * joints
+        found[:, :, ahead:] = self.ways.errors(batch, self.recorded[:, [0, -1]]) / self.noise[self.ways.joints]
+        found[:, ~self.counted, ahead:] = 0.0
         size = max(1, LARGEST_CALL // (len(windows.inputs.t) * 4 * count))
         recorded = self.recorded[:, 1:].swapaxes(0, 1)  # (H, N, joints)
         for begin in range(0, batch.size, size):
@@ -132,7 +148,7 @@ class Predictions:
             errors = at - recorded[..., None]
             errors = np.clip(np.nan_to_num(errors, nan=np.inf), -self._largest[:, None], self._largest[:, None])
             errors = errors / self.noise[:, None] * self.counted[None, :, None, None]
-            found[part] = np.transpose(errors, (3, 1, 0, 2)).reshape(len(part), count, -1)
+            found[part, :, :ahead] = np.transpose(errors, (3, 1, 0, 2)).reshape(len(part), count, -1)
         return found
 
     def _shown(self, batch: ModelBatch, filters: Sequence[Filter]) -> np.ndarray:

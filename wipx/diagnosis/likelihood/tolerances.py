@@ -58,7 +58,7 @@ def _periods(names: tuple[str, ...], fitter: Fitter, predictions: Predictions, f
     errors += [_errors(fitter, fit, _shifted(model, name, shift)) for name, shift in zip(names, shifts, strict=True)]
     found: dict[str, dict[str, float]] = {}
     for i, (name, j) in enumerate(zip(names, joints, strict=True)):
-        tried = _tried(model, plant.joints[j])
+        tried = _tried(model, plant.joints[j], np.ptp(predictions.recorded[..., j]))
         slopes = _slopes(predictions, j, (errors[i + 1] - errors[0]) / shifts[i], tried)
         tolerance = kind_of(name).tolerance["s"]
         white = fitter.whitened(errors[0] + np.concatenate([np.zeros_like(slopes[:1]), tolerance * slopes]), fit.noise)
@@ -69,7 +69,7 @@ def _periods(names: tuple[str, ...], fitter: Fitter, predictions: Predictions, f
 
 
 def _errors(fitter: Fitter, fit: Fit, model: Model) -> np.ndarray:
-    """Errors of a model in units of the sensor noise, shape (N, H joints)."""
+    """Errors of a model in units of the sensor noise, shape (N, E)."""
     return fitter.errors_of(ModelBatch(model, (), np.zeros((1, 0))), fit.levels, model)[0]
 
 
@@ -78,33 +78,33 @@ def _shifted(model: Model, encoder: str, shift: float) -> Model:
     return model.with_effects({encoder: {"s": 0.0, "c": shift * EVERYWHERE, "n": EVERYWHERE}})
 
 
-def _tried(model: Model, joint: str) -> np.ndarray:
-    """Numbers of periods per turn of a hinge, or per 2 pi m of a rail."""
+def _tried(model: Model, joint: str, way: float) -> np.ndarray:
+    """Numbers of periods per turn of a hinge, or per 2 pi m of a rail; at least one on the recorded way [rad or m]."""
     radius = model.parameters.get("wheel_radius", PULLEY)
-    fewest = FEWEST if model.plant.is_angular(joint) else 1.0 / radius
+    fewest = max(FEWEST if model.plant.is_angular(joint) else 1.0 / radius, 2.0 * np.pi / way)
     return np.geomspace(fewest, RANGE * fewest, TRIED)
 
 
 def _slopes(predictions: Predictions, j: int, response: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Errors by sine and cosine of an eccentric encoder of joint j, shape (2 numbers, N, H joints).
+    """Errors by sine and cosine of an eccentric encoder of joint j, shape (2 numbers, N, E).
 
     An error at the start of a prediction moves it as one of all angles does, but for what the sensor itself shows.
 
     Args:
         predictions: N of them.
         j: The joint.
-        response: Errors by an error of all angles, shape (N, H joints).
+        response: Errors by an error of all angles, shape (N, E).
         numbers: As `_tried` has them.
     """
     place = predictions.recorded[..., j]  # (N, 1 + H)
     own = np.zeros((place.shape[1] - 1, len(predictions.noise)))
     own[:, j] = 1.0 / predictions.noise[j]
-    moved = response - own.ravel()
-    found = []
+    found, ahead = [], own.size  # ways by recorded rates do not count
+    moved = response - np.pad(own.ravel(), (0, predictions.size - ahead))
     for number in numbers:
         for wave in (np.sin(number * place) / number, np.cos(number * place) / number):
-            shown = wave[:, 1:, None] * own
-            found.append(shown.reshape(len(place), -1) + wave[:, :1] * moved)
+            shown = (wave[:, 1:, None] * own).reshape(len(place), -1)
+            found.append(np.pad(shown, ((0, 0), (0, predictions.size - ahead))) + wave[:, :1] * moved)
     return np.array(found)
 
 
