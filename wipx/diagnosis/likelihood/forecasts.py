@@ -136,7 +136,8 @@ class ForecastFitter(Fitter):
     @cached_property
     def predictions(self) -> Predictions:
         """All predictions."""
-        return Predictions(self.simulator, self.data, self.noise, self.horizons)
+        doubt = self.rules.forecasts.undeclared
+        return Predictions(self.simulator, self.data, self.noise, doubt, self.horizons)
 
     @cached_property
     def stretches(self) -> Stretches:

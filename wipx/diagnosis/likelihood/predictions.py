@@ -39,12 +39,14 @@ class Predictions:
         simulator: The engine.
         data: The recordings.
         noise: Sensor noise of each coordinate, shape (joints,) [m or rad].
+        doubt: Relative standard deviation of the scale of recorded rates.
         horizons: After the rows that a start is estimated from [s]; 0 for one row.
     """
 
     simulator: AnalyticSimulator
     data: RecordingBatch
     noise: np.ndarray
+    doubt: float
     horizons: tuple[float, ...] = HORIZONS
 
     @property
@@ -100,7 +102,7 @@ class Predictions:
     def ways(self) -> Ways:
         """How far recorded rates say that joints move along each prediction."""
         ends = start_rows(self.windows), self.sampled[-1]
-        return Ways.of(self._recordings, self.data.plant, self.windows, *ends)
+        return Ways.of(self._recordings, self.data.plant, self.windows, *ends, self.doubt)
 
     @property
     def size(self) -> int:

@@ -11,10 +11,9 @@ import numpy as np
 from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
+from wipx.core.results import NINETY_FIVE
 from wipx.identify.sensors import true_states
 from wipx.identify.windows import Windows
-
-OF_ITS_OWN = 3.0  # standard deviations by which a rate must contradict the coordinate: else it may be taken from it
 
 
 @dataclass(frozen=True)
@@ -35,15 +34,30 @@ class Ways:
 
     @classmethod
     def of(
-        cls, recordings: tuple[Recording, ...], plant: Plant, windows: Windows, start: np.ndarray, end: np.ndarray
+        cls,
+        recordings: tuple[Recording, ...],
+        plant: Plant,
+        windows: Windows,
+        start: np.ndarray,
+        end: np.ndarray,
+        doubt: float,
     ) -> "Ways":
-        """Ways between two rows of each window, shape (N,)."""
+        """Ways between two rows of each window.
+
+        Args:
+            recordings: R of them.
+            plant: Names their rates.
+            windows: N of them.
+            start: First row of each window's way, shape (N,).
+            end: Last row, shape (N,).
+            doubt: Relative standard deviation of a rate's scale; what contradicts it less tells nothing.
+        """
         rows = windows.row + start, windows.row + end
         found = [
             (j, *_between(recordings, windows.recording, plant.rates[j], rows)) for j in _with_rate(recordings, plant)
         ]
         at = [windows.recorded[row, :, np.arange(windows.count)] for row in (start, end)]
-        kept = [(j, way, change) for j, way, change in found if _contradicts(way, change, (at[1] - at[0])[:, j])]
+        kept = [(j, way, change) for j, way, change in found if _contradicts(way, change, (at[1] - at[0])[:, j], doubt)]
         columns = [np.array([each[i] for each in kept]).reshape(len(kept), windows.count).T for i in (1, 2)]
         return cls(np.array([j for j, _, _ in kept], dtype=np.int64), len(plant.joints), *columns)
 
@@ -83,12 +97,15 @@ def _between(
     return way, change
 
 
-def _contradicts(way: np.ndarray, change: np.ndarray, shown: np.ndarray) -> bool:
-    """Whether a coordinate does not move as far as its rate says; windows overlap, each with the next."""
+def _contradicts(way: np.ndarray, change: np.ndarray, shown: np.ndarray, doubt: float) -> bool:
+    """Whether a coordinate does not move as far as its rate says, with 95 % confidence.
+
+    One that does may be what the rate was taken from. Windows overlap, each with the next.
+    """
     known = np.column_stack([way, change, np.ones(len(way))])
     if len(way) <= 2 * known.shape[1] or np.ptp(way) == 0.0:
         return False
     numbers, *_ = np.linalg.lstsq(known, shown, rcond=None)
     left = shown - known @ numbers
     variance = 2.0 * float(left @ left) / (len(way) - known.shape[1]) * np.linalg.pinv(known.T @ known)[0, 0]
-    return bool(abs(numbers[0] - 1.0) > OF_ITS_OWN * np.sqrt(variance))
+    return bool(abs(numbers[0] - 1.0) > NINETY_FIVE * np.sqrt(variance + doubt**2))
