@@ -29,6 +29,7 @@ USUAL_TIME = 0.03  # [s] from which its search starts
 REACH = 12.0  # natural logarithms by which a level may differ from where its search starts
 LEAST = 1e-300  # of a level, whose logarithm is searched
 AT_BOUND = 0.99  # share of the longest time from which a search counts as stopped by it
+DIFFERENCE = 1e-4  # of the logarithms, by which slopes are taken: the likelihood has ten digits
 ITERATIONS = 40  # of the search, at most
 
 
@@ -123,7 +124,7 @@ class _Likelihood:
             levels = NoiseLevels(force, np.concatenate([white, start.sensor[joints:]]))
             return levels, LastingNoise(tuple(deviations.tolist()), tuple(times.tolist()))
 
-        limits = {"maxiter": ITERATIONS}
+        limits = {"maxiter": ITERATIONS, "eps": DIFFERENCE}
         ended = minimize(lambda x: -self(*parts(x)), begun, method="L-BFGS-B", bounds=reach, options=limits)
         return parts(ended.x)
 

@@ -12,7 +12,7 @@ from wipx.core.model import ModelBatch
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
 from wipx.core.results import NINETY_FIVE
-from wipx.identify.sensors import true_states
+from wipx.identify.sensors import scales_of
 from wipx.identify.windows import Windows
 
 
@@ -22,13 +22,11 @@ class Ways:
 
     Attributes:
         joints: Their indices, shape (W,).
-        count: Number of all joints.
         way: Integral of each rate from the window's start to its end, shape (N, W) [m or rad].
         change: By how much the rate changes meanwhile, shape (N, W) [m/s or rad/s].
     """
 
     joints: np.ndarray
-    count: int
     way: np.ndarray
     change: np.ndarray
 
@@ -59,21 +57,19 @@ class Ways:
         at = [windows.recorded[row, :, np.arange(windows.count)] for row in (start, end)]
         kept = [(j, way, change) for j, way, change in found if _contradicts(way, change, (at[1] - at[0])[:, j], doubt)]
         columns = [np.array([each[i] for each in kept]).reshape(len(kept), windows.count).T for i in (1, 2)]
-        return cls(np.array([j for j, _, _ in kept], dtype=np.int64), len(plant.joints), *columns)
+        return cls(np.array([j for j, _, _ in kept], dtype=np.int64), *columns)
 
     def errors(self, batch: ModelBatch, recorded: np.ndarray) -> np.ndarray:
-        """Ways of the coordinates less those of the rates, as the sensors of P models show them, shape (P, N, W).
+        """Ways of the coordinates, by the scale of their sensors, less those of the rates, shape (P, N, W).
+
+        The eccentricity of an encoder is left out: over a short way it would do for any scale.
 
         Args:
             batch: The models.
             recorded: Coordinates at the start and at the end of every window, shape (N, 2, joints).
         """
-        if not len(self.joints):
-            return np.zeros((batch.size, len(recorded), 0))
-        shown = np.zeros((2, 2 * self.count, batch.size, len(recorded)))
-        shown[:, : self.count] = np.moveaxis(recorded, 0, -1)[:, :, None]
-        true = true_states(batch, shown)[:, self.joints]  # (2, W, P, N)
-        errors = np.transpose(true[1] - true[0], (1, 2, 0)) - self.way
+        shown = (recorded[:, 1] - recorded[:, 0])[:, self.joints]
+        errors = shown / scales_of(batch)[self.joints].T[:, None] - self.way
         for i, change in enumerate(self.change.T):
             known = np.column_stack([change, np.ones(len(change))])
             errors[:, :, i] -= errors[:, :, i] @ np.linalg.pinv(known).T @ known.T

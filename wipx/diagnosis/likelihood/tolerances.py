@@ -58,7 +58,7 @@ def _periods(names: tuple[str, ...], fitter: Fitter, predictions: Predictions, f
     errors += [_errors(fitter, fit, _shifted(model, name, shift)) for name, shift in zip(names, shifts, strict=True)]
     found: dict[str, dict[str, float]] = {}
     for i, (name, j) in enumerate(zip(names, joints, strict=True)):
-        tried = _tried(model, plant.joints[j], np.ptp(predictions.recorded[..., j]))
+        tried = _tried(model, plant.joints[j])
         slopes = _slopes(predictions, j, (errors[i + 1] - errors[0]) / shifts[i], tried)
         tolerance = kind_of(name).tolerance["s"]
         white = fitter.whitened(errors[0] + np.concatenate([np.zeros_like(slopes[:1]), tolerance * slopes]), fit.noise)
@@ -78,10 +78,10 @@ def _shifted(model: Model, encoder: str, shift: float) -> Model:
     return model.with_effects({encoder: {"s": 0.0, "c": shift * EVERYWHERE, "n": EVERYWHERE}})
 
 
-def _tried(model: Model, joint: str, way: float) -> np.ndarray:
-    """Numbers of periods per turn of a hinge, or per 2 pi m of a rail; at least one on the recorded way [rad or m]."""
+def _tried(model: Model, joint: str) -> np.ndarray:
+    """Numbers of periods per turn of a hinge, or per 2 pi m of a rail."""
     radius = model.parameters.get("wheel_radius", PULLEY)
-    fewest = max(FEWEST if model.plant.is_angular(joint) else 1.0 / radius, 2.0 * np.pi / way)
+    fewest = FEWEST if model.plant.is_angular(joint) else 1.0 / radius
     return np.geomspace(fewest, RANGE * fewest, TRIED)
 
 
