@@ -50,7 +50,7 @@ def test_thresholds_beside_means_of_noisy_commands_are_not_biased(effect: str, f
     for name, value in truth.items():
         assert fit.hypothesis.values[name] == pytest.approx(value, rel=0.08)
     # Three commands a row: their spread about the mean is known from how the means scatter.
-    assert case.data.command_spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
+    assert case.data.inputs.spread[0] == pytest.approx(np.sqrt(6.0 * 2.0 / 3.0) * NOISE, rel=0.15)
     assert 0.6 < fit.levels.spread < 1.6
     single = case.fitter.fit(fit.hypothesis, replace(fit.levels, spread=1e-9))
     assert fit.log_likelihood > single.log_likelihood + 50.0

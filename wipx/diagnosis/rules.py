@@ -246,6 +246,13 @@ class TrustRules:
         "derived: most of it; at most 0.8 with a sensor's lasting noise, at least 0.8 on real machines",
         UNLIMITED,
     )
+    forgotten: float = rule(
+        0.01,
+        "of a sensor's noise",
+        "share that may be left of it after half a second; what lasts longer is a force",
+        "judgement: the end of a prediction does not know the noise at its start",
+        0.99,
+    )
     smoothed: float = rule(
         1e-3,
         "of the power of second differences",

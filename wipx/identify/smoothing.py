@@ -24,7 +24,7 @@ from wipx.identify.kalman import FIRST_SPAN, Filter, Places, gains_along
 from wipx.identify.linearisation import Linearisation, linearise_along
 from wipx.identify.noise import LastingNoise
 from wipx.identify.sensors import delays_of, scales_of, true_states
-from wipx.identify.unlogged_commands import command_spread, jolts
+from wipx.identify.unlogged_commands import inputs_along, jolts
 from wipx.identify.windows import LOOK_AHEAD
 from wipx.sim.analytic import AnalyticSimulator, Observer
 from wipx.sim.cache import cached
@@ -224,13 +224,7 @@ class Smoother:
 
     @cached_property
     def _inputs(self) -> Inputs:
-        return Inputs.of(
-            [r.t for r in self.recordings],
-            [r.stack(self.plant.commands) for r in self.recordings],
-            [0] * len(self.recordings),
-            tuple(r.periods for r in self.recordings),
-            command_spread(self.recordings, self.plant),
-        )
+        return inputs_along(self.recordings, self.plant)
 
     @cached_property
     def _measured(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Commands that a log does not have: how they moved the body unseen."""
+"""Commands that a log does not have: how they scatter about those that it has, and how they moved the body unseen."""
 
 import numpy as np
 
@@ -27,6 +27,17 @@ def command_spread(recordings: tuple[Recording, ...], plant: Plant) -> np.ndarra
         scaled = [np.sqrt(r.periods - 1) * noise_of_means(r, name) for r in recordings]
         found.append(np.sqrt(6.0) * float(np.median(scaled)))
     return np.array(found)
+
+
+def inputs_along(recordings: tuple[Recording, ...], plant: Plant) -> Inputs:
+    """All rows of recordings, each integrated from its first one."""
+    return Inputs.of(
+        [recording.t for recording in recordings],
+        [recording.stack(plant.commands) for recording in recordings],
+        [0] * len(recordings),
+        tuple(recording.periods for recording in recordings),
+        command_spread(recordings, plant),
+    )
 
 
 def jolts(model: Model, recordings: tuple[Recording, ...], inputs: Inputs, coordinates: np.ndarray) -> np.ndarray:

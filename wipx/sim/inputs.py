@@ -1,6 +1,6 @@
 """Inputs of rollouts: windows of time and command, side by side in one array."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,8 +19,8 @@ class Inputs:
         last: Last row of each window, shape (R,).
         ramps: By how much the command changes along each row about its mean, shape (K, inputs, R); None
             where commands are held.
-        spread: Half width by which single commands scatter about the mean of a row, shape (inputs,); thresholds of the
-            actuator answer to single commands. None where every command is in the log.
+        spread: Half width by which single commands scatter about the mean of a row, shape (inputs,), or (1,) where it
+            is the same for all: zero where every command is in the log. Thresholds of the actuator answer to them.
     """
 
     t: np.ndarray
@@ -28,7 +28,7 @@ class Inputs:
     first: np.ndarray
     last: np.ndarray
     ramps: np.ndarray | None = None
-    spread: np.ndarray | None = None
+    spread: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
         # The kernel is compiled anew for every layout in memory.
@@ -68,7 +68,7 @@ class Inputs:
             for r, (window_t, window_u) in enumerate(zip(times, commands, strict=True)):
                 ramps[: len(window_t) - 1, :, r] = _ramps(window_t, window_u, periods[r])
         last = np.array([len(x) - 1 for x in times], dtype=np.int64)
-        return cls(t, u, np.array(first, dtype=np.int64), last, ramps, spread)
+        return cls(t, u, np.array(first, dtype=np.int64), last, ramps, np.zeros(1) if spread is None else spread)
 
     @classmethod
     def regular(cls, duration: float, rate: float, inputs: int, windows: int = 1) -> "Inputs":

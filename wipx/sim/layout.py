@@ -122,8 +122,7 @@ class Layout:
     def spread(self) -> np.ndarray:
         """Half width by which single commands scatter about the mean that the log has, shape (N, 1)."""
         spread = np.zeros((self.width, 1))
-        if self.inputs.spread is not None:
-            spread[self.driven, 0] = self.inputs.spread
+        spread[self.driven, 0] = self.inputs.spread
         return spread
 
     def block(self, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

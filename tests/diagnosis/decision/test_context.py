@@ -73,7 +73,7 @@ def test_a_joint_whose_drive_swings_unseen_may_ask_for_forces(
     right = Hypothesis.of(case.setting, (SPRING,), {f"{SPRING}.{name}": value for name, value in spring.items()})
     force = case.quiet.force * np.where(np.array(model.plant.joints) == loud, 100.0, 1.0)
     fit = context.fitter.fit(right, replace(case.quiet, force=force), steps=0)
-    monkeypatch.setattr(Context, "noise_of", lambda _context, loud: NoiseSources(loud.levels.force, None))
+    monkeypatch.setattr(Context, "noise_of", lambda _, of: NoiseSources(of.levels.force, None))
     assert context.is_quiet(fit) is quiet
 
 

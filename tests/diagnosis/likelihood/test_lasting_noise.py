@@ -9,17 +9,19 @@ from sim.robots import unit_axis
 from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.core.results import HORIZON
-from wipx.diagnosis.likelihood.lasting_noise import LONGEST, NoiseSources, noise_sources
+from wipx.diagnosis.likelihood.lasting_noise import NoiseSources, noise_sources
 from wipx.diagnosis.rules import USUAL
 from wipx.identify.evaluation import Judge
 from wipx.identify.noise import LastingNoise, sensor_noise
 from wipx.sim.inputs import Inputs
 
+LONGEST = 0.11  # [s] correlation time
 
-def sources_of(case: Bench, rng: np.random.Generator) -> NoiseSources:
+
+def sources_of(case: Bench) -> NoiseSources:
     """What noise is found beside the right model."""
     fit = case.fitter.converged(case.fit())
-    return noise_sources(case.fitter.innovations_model, fit)
+    return noise_sources(case.fitter.innovations_model, fit, LONGEST)
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis"])
@@ -27,7 +29,7 @@ def test_noise_of_sensors_that_lasts_comes_back(kind: str, fresh_seed: int):
     case = bench(kind, {}, fresh_seed, duration=6.0)
     rng = np.random.default_rng(fresh_seed)
     case = Bench(case.nominal, coloured(case.recordings, rng), {})
-    found = sources_of(case, rng)
+    found = sources_of(case)
     assert found.lasting is not None
     time = float(np.median(np.diff(case.recordings[0].t))) / -np.log(0.9)
     for name, deviation, lasted in zip(
@@ -53,7 +55,7 @@ def test_a_random_force_is_no_noise_of_a_sensor(lasts: float, fresh_seed: int):
     run = SIMULATOR.replay(ModelBatch(unit_axis({})), inputs, np.zeros((2, 1, 1)))
     x = run.coordinates[:, 0, 0, 0] + 1e-4 * rng.normal(size=len(t))
     case = Bench(unit_axis({}), (Recording("r1.csv", {"t": t, "x": x, "u": command}),), {})
-    found = sources_of(case, rng)
+    found = sources_of(case)
     assert found.force[0] > (
         0.5 * size if not lasts else 2.0 * USUAL.trust.quiet * case.setting.scales["translation"].force
     )

@@ -187,7 +187,8 @@ class Context:
                 errors = self.judge.compare(nominal, model, self.recordings, held_out=False)[0]
                 large = errors.times_the_floor > self.rules.trust.near_floor
                 if large or np.any(by_row.asks_for_force(known.force, self.setting.scales)):
-                    found = noise_sources(by_row.innovations_model, seen)
+                    longest = HORIZON / -float(np.log(self.rules.trust.forgotten))
+                    found = noise_sources(by_row.innovations_model, seen, longest)
                     coloured = by_row.foretold(seen) > self.rules.trust.foretold
                     least = np.where(coloured, found.force, np.minimum(found.force, known.force))
                     known = replace(found, force=least)

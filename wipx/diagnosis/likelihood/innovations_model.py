@@ -79,7 +79,7 @@ class InnovationsModel:
             batch: P models.
             gains: Of one or more observers.
             group: Which of them each model has, shape (P,).
-            spread: Of the single commands, in multiples of `RecordingBatch.command_spread`, shape (P,).
+            spread: Of the single commands, in multiples of `Inputs.spread`, shape (P,).
         """
         data = self.data
         shown = self._shown(batch, gains, group, spread)
@@ -111,7 +111,7 @@ class InnovationsModel:
                 self.data.measured[:, : self.data.seen],
                 corrections,
                 group,
-                np.outer(spread, self.data.command_spread),
+                np.outer(spread, self.data.inputs.spread),
                 reports=self.data.reported.shape[1] > 0,
             ),
         )

@@ -14,7 +14,6 @@ from scipy.optimize import minimize
 
 from wipx.core.law import inlined
 from wipx.core.model import ModelBatch
-from wipx.core.results import HORIZON
 from wipx.diagnosis.likelihood.fitting import Fit
 from wipx.diagnosis.likelihood.innovations_model import InnovationsModel
 from wipx.diagnosis.likelihood.observer import NoiseLevels
@@ -23,8 +22,6 @@ from wipx.identify.noise import LastingNoise
 from wipx.identify.sensors import delays_of
 from wipx.sim.cache import booleans, cached_for, floats, integers
 
-FORGOTTEN = 0.01  # share of a sensor's noise that may be left after a prediction: what lasts longer is none of a sensor
-LONGEST = HORIZON / -np.log(FORGOTTEN)  # [s] correlation time
 USUAL_TIME = 0.03  # [s] from which its search starts
 REACH = 12.0  # natural logarithms by which a level may differ from where its search starts
 LEAST = 1e-300  # of a level, whose logarithm is searched
@@ -46,7 +43,7 @@ class NoiseSources:
     lasting: LastingNoise | None
 
 
-def noise_sources(model: InnovationsModel, fit: Fit) -> NoiseSources:
+def noise_sources(model: InnovationsModel, fit: Fit, longest: float) -> NoiseSources:
     """The levels of noise under which the innovations of a fit are likeliest.
 
     What is likeliest to last longer than a sensor's noise is a force.
@@ -54,12 +51,13 @@ def noise_sources(model: InnovationsModel, fit: Fit) -> NoiseSources:
     Args:
         model: Follows the recordings.
         fit: By its innovations.
+        longest: Correlation time of a sensor's noise, at most [s].
     """
     likelihood = _Likelihood.of(model, fit)
-    levels, lasting = likelihood.greatest(fit.levels, np.full(model.data.joints, fill_value=True))
-    brief = np.array(lasting.times) < AT_BOUND * LONGEST
+    levels, lasting = likelihood.greatest(fit.levels, np.full(model.data.joints, fill_value=True), longest)
+    brief = np.array(lasting.times) < AT_BOUND * longest
     if not np.all(brief):
-        levels, lasting = likelihood.greatest(fit.levels, brief)
+        levels, lasting = likelihood.greatest(fit.levels, brief, longest)
     return NoiseSources(levels.force, lasting)
 
 
@@ -101,12 +99,13 @@ class _Likelihood:
                 row[size + channel] = 1.0
         return cls(model, *(np.ascontiguousarray(x) for x in (errors, corrections, moves, shown)))
 
-    def greatest(self, start: NoiseLevels, lasts: np.ndarray) -> tuple[NoiseLevels, LastingNoise]:
+    def greatest(self, start: NoiseLevels, lasts: np.ndarray, longest: float) -> tuple[NoiseLevels, LastingNoise]:
         """Levels at which it is greatest, and the noise of those sensors whose noise may last.
 
         Args:
             start: Levels to start from.
             lasts: Whose noise may last, shape (joints,).
+            longest: Correlation time, at most [s].
         """
         data, lasting = self.model.data, np.flatnonzero(lasts)
         joints, count = data.joints, len(lasting)
@@ -115,7 +114,7 @@ class _Likelihood:
         shortest = float(data.intervals[data.intervals > 0.0].min())
         begun = np.log(np.concatenate([np.maximum(sizes, LEAST), np.full(count, USUAL_TIME)]))
         reach = [(size - REACH, size + REACH) for size in begun[: len(sizes)]]
-        reach += [(np.log(min(shortest, USUAL_TIME)), np.log(LONGEST))] * count
+        reach += [(np.log(min(shortest, USUAL_TIME)), np.log(longest))] * count
 
         def parts(numbers: np.ndarray) -> tuple[NoiseLevels, LastingNoise]:
             force, white, deviation, time = np.split(np.exp(numbers), np.cumsum([joints, joints, count]))

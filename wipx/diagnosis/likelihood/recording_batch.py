@@ -7,7 +7,7 @@ import numpy as np
 
 from wipx.core.plant import Plant
 from wipx.core.recording import Recording
-from wipx.identify.unlogged_commands import command_spread
+from wipx.identify.unlogged_commands import inputs_along
 from wipx.sim.inputs import Inputs
 
 FORETELLING = 4  # rows from which a command is foretold
@@ -43,12 +43,7 @@ class RecordingBatch:
         """All rows; a rate counts as recorded where every recording has it."""
         names = (*plant.coordinates, *plant.rates)
         channels = [c for c, name in enumerate(names) if all(name in r for r in recordings)]
-        inputs = Inputs.of(
-            [r.t for r in recordings],
-            [r.stack(plant.commands) for r in recordings],
-            [0] * len(recordings),
-            tuple(r.periods for r in recordings),
-        )
+        inputs = inputs_along(recordings, plant)
         measured = np.zeros((len(inputs.t), len(names), len(recordings)))
         for i, recording in enumerate(recordings):
             measured[: len(recording), channels, i] = recording.stack(tuple(names[c] for c in channels))
@@ -104,11 +99,6 @@ class RecordingBatch:
     def has_means(self) -> bool:
         """Whether rows have means of commands only, the log being slower than the loop."""
         return any(recording.periods > 1 for recording in self.recordings)
-
-    @cached_property
-    def command_spread(self) -> np.ndarray:
-        """Half width by which single commands scatter about a row's mean if their noise is white, shape (inputs,)."""
-        return command_spread(self.recordings, self.plant)
 
     @cached_property
     def surprises(self) -> np.ndarray:
