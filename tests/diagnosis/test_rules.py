@@ -36,6 +36,12 @@ def test_a_rule_is_changed_on_the_command_line():
     assert rules.without("selection.least_share") == USUAL.without("selection.least_share")
 
 
+@pytest.mark.parametrize("value", [-0.1, float("nan")])
+def test_a_rule_that_is_negative_or_no_number_is_refused(value: float):
+    with pytest.raises(InputError, match=r"diagnosis\.trust\.noise_lasts is .*; expected zero or more \[s\]"):
+        build({"_target_": "wipx.diagnosis.rules.Rules", "trust": {"noise_lasts": value}}, "diagnosis")
+
+
 def test_an_unknown_rule_is_refused():
     node = {"_target_": "wipx.diagnosis.rules.Rules", "selection": {"least_shar": 0.02}}
     with pytest.raises(InputError, match=r"diagnosis\.selection.*least_share"):

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from wipx.core.errors import InputError
+
 BIC = "derived: odds of 3000 to 1 cover a search over some thirty effects and their grids"
 DEVELOPING = "chosen on generated robots while developing"
 REAL = "chosen on public recordings of real machines"
@@ -246,12 +248,12 @@ class TrustRules:
         "derived: most of it; at most 0.8 with a sensor's lasting noise, at least 0.8 on real machines",
         UNLIMITED,
     )
-    forgotten: float = rule(
-        0.01,
-        "of a sensor's noise",
-        "share that may be left of it after half a second; what lasts longer is a force",
-        "judgement: the end of a prediction does not know the noise at its start",
-        0.99,
+    noise_lasts: float = rule(
+        0.11,
+        "s",
+        "correlation time of a sensor's noise, at most; what lasts longer is a force",
+        "judgement: after half a second a hundredth of it is left",
+        UNLIMITED,
     )
     smoothed: float = rule(
         1e-3,
@@ -343,7 +345,7 @@ class PlausibilityRules:
 
 @dataclass(frozen=True)
 class Rules:
-    """All rules of a diagnosis.
+    """All rules of a diagnosis, zero or more.
 
     Attributes:
         selection: What an effect must gain.
@@ -355,6 +357,9 @@ class Rules:
         answer: What is said of numbers, rivals and places.
         experiment: Which next experiment is worth proposing.
         plausibility: When a description of a robot is refused.
+
+    Raises:
+        InputError: a rule is negative or no number.
     """
 
     selection: SelectionRules = SelectionRules()
@@ -366,6 +371,11 @@ class Rules:
     answer: AnswerRules = AnswerRules()
     experiment: ExperimentRules = ExperimentRules()
     plausibility: PlausibilityRules = PlausibilityRules()
+
+    def __post_init__(self) -> None:
+        for name, value, note in self.each():
+            if not value >= 0.0:
+                raise InputError(f"diagnosis.{name} is {value:g}; expected zero or more [{note.unit or '-'}]")
 
     def each(self) -> Iterator[tuple[str, float, Note]]:
         """Name "part.rule", value and note of every rule."""

@@ -15,13 +15,11 @@ from wipx.identify.evaluation import Judge
 from wipx.identify.noise import LastingNoise, sensor_noise
 from wipx.sim.inputs import Inputs
 
-LONGEST = 0.11  # [s] correlation time
-
 
 def sources_of(case: Bench) -> NoiseSources:
     """What noise is found beside the right model."""
     fit = case.fitter.converged(case.fit())
-    return noise_sources(case.fitter.innovations_model, fit, LONGEST)
+    return noise_sources(case.fitter.innovations_model, fit, USUAL.trust.noise_lasts)
 
 
 @pytest.mark.parametrize("kind", ["wip", "pendulum", "linear_axis"])
@@ -73,7 +71,7 @@ def test_the_floor_is_what_a_right_model_errs(kind: str, fresh_seed: int):
     bandwidths = dict.fromkeys(names, 3.0)
     knowing = Judge(SIMULATOR, white, HORIZON, bandwidths, LastingNoise(deviations, (time,) * len(names)))
     errors = knowing.compare(model, model, recordings, held_out=True)[0]
-    assert time < LONGEST
+    assert time < USUAL.trust.noise_lasts
     for name in names:
         assert errors.completed[name] == pytest.approx(errors.noise_floor[name], rel=0.4)
     unknowing = Judge(SIMULATOR, white, HORIZON, bandwidths).compare(model, model, recordings, held_out=True)[0]

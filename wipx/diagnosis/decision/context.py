@@ -187,8 +187,7 @@ class Context:
                 errors = self.judge.compare(nominal, model, self.recordings, held_out=False)[0]
                 large = errors.times_the_floor > self.rules.trust.near_floor
                 if large or np.any(by_row.asks_for_force(known.force, self.setting.scales)):
-                    longest = HORIZON / -float(np.log(self.rules.trust.forgotten))
-                    found = noise_sources(by_row.innovations_model, seen, longest)
+                    found = noise_sources(by_row.innovations_model, seen, self.rules.trust.noise_lasts)
                     coloured = by_row.foretold(seen) > self.rules.trust.foretold
                     least = np.where(coloured, found.force, np.minimum(found.force, known.force))
                     known = replace(found, force=least)

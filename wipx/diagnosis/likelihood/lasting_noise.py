@@ -114,7 +114,7 @@ class _Likelihood:
         shortest = float(data.intervals[data.intervals > 0.0].min())
         begun = np.log(np.concatenate([np.maximum(sizes, LEAST), np.full(count, USUAL_TIME)]))
         reach = [(size - REACH, size + REACH) for size in begun[: len(sizes)]]
-        reach += [(np.log(min(shortest, USUAL_TIME)), np.log(longest))] * count
+        reach += [(np.log(min(shortest, USUAL_TIME)), np.log(max(longest, shortest, USUAL_TIME)))] * count
 
         def parts(numbers: np.ndarray) -> tuple[NoiseLevels, LastingNoise]:
             force, white, deviation, time = np.split(np.exp(numbers), np.cumsum([joints, joints, count]))
