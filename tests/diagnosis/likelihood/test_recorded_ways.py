@@ -39,15 +39,17 @@ def test_only_a_rate_that_contradicts_the_coordinate_counts(of_the_coordinate: b
     assert ways.joints.tolist() == ([] if of_the_coordinate else [0])
 
 
-def test_the_right_scale_leaves_no_way_and_a_late_rate_none(fresh_seed: int):
+def test_ways_tell_the_scale_of_a_sensor_beside_a_late_rate_with_an_offset(fresh_seed: int):
     rng = np.random.default_rng(fresh_seed)
     case = bench("linear_axis", {TRUTH: {"e": SCALE}}, fresh_seed, count=4, duration=6.0)
     seen = predictions(with_rates(case, of_the_coordinate=False, rng=rng))
     right = nominal_model("linear_axis").with_effects({TRUTH: {"e": SCALE}})
     without, left = (
-        seen.ways.errors(ModelBatch(model), seen.recorded[:, [0, -1]])[0] for model in (case.nominal, right)
+        seen.ways.errors(ModelBatch(model), seen.recorded[:, [0, -1]])[0, :, 0] for model in (case.nominal, right)
     )
-    assert np.std(left) < 0.2 * np.std(without)
+    way = seen.ways.way[:, 0] - seen.ways.way[:, 0].mean()
+    for errors, slope in ((without, SCALE), (left, 0.0)):
+        assert errors @ way / (way @ way) == pytest.approx(slope, abs=DOUBT)
 
 
 @pytest.mark.slow
