@@ -7,12 +7,11 @@ is a loop over the lanes of a block and is skipped where it is absent (see `wipx
 
 from wipx.core.law import clip, law, sign, sin_cos
 from wipx.effects import backlash as backlash_law
-from wipx.effects import dead_zone, saturation, speed_limit
+from wipx.effects import dead_zone, sag, saturation, speed_limit
 from wipx.effects.trees import elasticity
 from wipx.sim import rows as R
 from wipx.sim.rows import W
 
-TINY = 1e-200  # [N or N m] added to forces by which something is divided
 EARLY = 1e-9  # [s] before its time that the loop of a drive looks; steps end there but for rounding
 
 
@@ -85,10 +84,11 @@ def actuator_path(S, J, n, on, has, j):
             J[R.DRIVE * W + w] = dead_zone.force(J[R.DRIVE * W + w], J[R.DEAD_BAND * W + w], J[R.SPREAD * W + w])
     if has[j, R.ON_SAG]:
         for w in range(n):
-            asked, usual, middle = abs(J[R.DRIVE * W + w]), J[R.SAG_USUAL * W + w], J[R.SAG_MIDDLE * W + w]
-            lost = J[R.SAG_TIME * W + w] * (min(S[R.TIME * W + w], 2.0 * middle) - middle)
-            lost += J[R.SAG_LOAD * W + w] * (asked - usual) / (asked + usual + TINY)
-            J[R.DRIVE * W + w] *= 1.0 - lost
+            middle = J[R.SAG_MIDDLE * W + w]
+            emptied = J[R.SAG_TIME * W + w] * (min(S[R.TIME * W + w], 2.0 * middle) - middle)
+            J[R.DRIVE * W + w] = sag.force(
+                J[R.DRIVE * W + w], emptied, J[R.SAG_LOAD * W + w], J[R.SAG_USUAL * W + w], J[R.SPREAD * W + w]
+            )
     if has[j, R.ON_GAIN]:
         for w in range(n):
             J[R.DRIVE * W + w] *= J[R.GAIN * W + w]

@@ -42,6 +42,12 @@ def test_a_gain_is_named_although_drives_sag(fresh_seed: int):
     assert beside_doubts(weak, "actuator/gain") == (True, True)
 
 
+def test_a_gain_is_not_named_where_a_drive_sags_about_half_the_usual_force(fresh_seed: int):
+    usual = bench("linear_axis", {}, fresh_seed, count=3).setting.scales["actuator"].usual
+    sag = {"d": 0.0, "l": 0.25, "t_0": 1.5, "u_0": 0.5 * usual}
+    assert beside_doubts(bench("linear_axis", {DRIVE: sag}, fresh_seed, count=3), "actuator/gain") == (True, False)
+
+
 def test_numbers_within_tolerance_have_priors_and_others_are_given(fresh_seed: int):
     case = bench("pendulum", {}, fresh_seed)
     fitter = forecasts(case)
@@ -50,5 +56,7 @@ def test_numbers_within_tolerance_have_priors_and_others_are_given(fresh_seed: i
     free = {number.name: number for number in moved.space.free}
     assert free[f"{ENCODER}.s"].prior_std == pytest.approx(0.01)
     assert free[f"{DRIVE}.l"].prior_std == pytest.approx(0.2)
-    assert not {f"{ENCODER}.n", f"{DRIVE}.t_0", f"{DRIVE}.u_0"} & set(free)
+    assert free[f"{DRIVE}.u_0"].prior_mean == pytest.approx(case.setting.scales["actuator"].usual)
+    assert free[f"{DRIVE}.u_0"].of_factor
+    assert not {f"{ENCODER}.n", f"{DRIVE}.t_0"} & set(free)
     assert np.all(np.abs(moved.space.prior_residuals(moved.cube)) < 4.0)
