@@ -1,7 +1,7 @@
-"""Compile ahead what takes longest: the simulator, and side by side the filters along recordings.
+"""Compile ahead what takes longest: the simulator, the laws beside other engines, and the filters along recordings.
 
-`python -m wipx.compilation` does both, as `make setup` does. A program that finds nothing compiled does the same while
-it runs (`wipx.sim.first_use`).
+`python -m wipx.compilation` does all, as `make setup` does. A program that finds nothing compiled compiles the simulator
+and the filters while it runs (`wipx.sim.first_use`).
 """
 
 import sys
@@ -12,9 +12,11 @@ from filelock import FileLock, Timeout
 from wipx.core.model import Model, ModelBatch
 from wipx.core.plant import plant_of
 from wipx.sim.analytic import AnalyticSimulator
+from wipx.sim.bullet import BulletSimulator
 from wipx.sim.cache import AHEAD, compiled_folder
 from wipx.sim.first_use import FILTERS, begun
 from wipx.sim.inputs import Inputs
+from wipx.sim.simulator import Simulator
 
 BODY = {"body_mass": 1.0, "com_height": 0.5, "body_inertia": 0.1}
 
@@ -31,11 +33,11 @@ def compile_filters() -> None:
         pass
 
 
-def compile_simulator() -> None:
-    """Compile the simulator, and have the filters compiled meanwhile."""
+def compile_by_use(simulator: Simulator) -> None:
+    """Let a simulator run; the analytic one has the filters compiled meanwhile."""
     plant = plant_of("pendulum")
     model = Model(plant, plant.complete(BODY, "compilation"), {})
-    AnalyticSimulator().replay(ModelBatch(model), Inputs.regular(0.01, 100.0, 1), np.zeros((2, 1, 1)))
+    simulator.replay(ModelBatch(model), Inputs.regular(0.01, 100.0, 1), np.zeros((2, 1, 1)))
 
 
 def main() -> int:
@@ -45,7 +47,8 @@ def main() -> int:
         Exit status.
     """
     if FILTERS[-1] not in sys.argv:
-        compile_simulator()
+        compile_by_use(AnalyticSimulator())
+        compile_by_use(BulletSimulator())
     if begun:
         return begun[0].wait()
     compile_filters()

@@ -1,4 +1,4 @@
-"""Thresholds of the actuator beside a log that has means of noisy commands only."""
+"""Laws of the actuator beside a log that has means of noisy commands only."""
 
 from dataclasses import replace
 
@@ -21,13 +21,14 @@ LIMITS = {
     "actuator/saturation": {"F_max": 5.0},
     "actuator/speed_limit": {"F_stall": 6.0, "v_free": 1.2},
 }
+LAWS = {**LIMITS, "actuator/sag": {"d": 0.0, "l": 0.6, "t_0": 4.0, "u_0": 2.0}}
 
 
 def noisily_driven(effect: str, seed: int) -> Recordings:
     """An axis on a spring that noisy commands swing, logged at every third row."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, 8.0, 0.002)
-    robot = nominal_model("linear_axis").with_effects({effect: LIMITS[effect], "environment/spring": SPRING})
+    robot = nominal_model("linear_axis").with_effects({effect: LAWS[effect], "environment/spring": SPRING})
     found = []
     for number in range(3):
         swing = 5.0 * np.sin(2.0 * np.pi * rng.uniform(0.5, 0.8) * t + rng.uniform(0.0, 6.0))
@@ -66,10 +67,10 @@ def test_a_dead_zone_is_looked_for_with_commands_that_scatter(fresh_seed: int):
     assert best.values["actuator/dead_zone.band"] == pytest.approx(0.8, rel=0.25)
 
 
-@pytest.mark.parametrize("effect", LIMITS)
+@pytest.mark.parametrize("effect", LAWS)
 def test_predictions_know_that_single_commands_scatter(effect: str, fresh_seed: int):
     recordings = noisily_driven(effect, fresh_seed)
-    robot = nominal_model("linear_axis").with_effects({effect: LIMITS[effect], "environment/spring": SPRING})
+    robot = nominal_model("linear_axis").with_effects({effect: LAWS[effect], "environment/spring": SPRING})
     noise = np.full(1, 1e-5)
     knowing = Judge(SIMULATOR, noise, HORIZON).compare(robot, robot, recordings, held_out=True)[0].completed["x"]
     held = tuple(replace(recording, periods=1) for recording in recordings)  # as if means were the commands

@@ -93,15 +93,15 @@ def test_every_effect_works_in_every_engine(engine: SteppedSimulator, kind: str,
 
 
 @EVERY
-@pytest.mark.parametrize("limit", ["dead_zone", "saturation", "speed_limit"])
-def test_thresholds_answer_to_commands_that_scatter_in_every_engine(
-    engine: SteppedSimulator, limit: str, fresh_seed: int
+@pytest.mark.parametrize("law", ["dead_zone", "saturation", "speed_limit", "sag"])
+def test_drives_answer_to_commands_that_scatter_in_every_engine(
+    engine: SteppedSimulator, law: str, fresh_seed: int
 ):
     t = uneven(np.random.default_rng(fresh_seed), 20)
     means = Inputs.of([t], [np.vstack([sines(t, 0.8), [[0.0]]])], [0], (3,))
     scattered = replace(means, spread=np.array([0.5]))
     start = np.array(LIVELY["wip"])[:, None, None]
-    model = ModelBatch(forceful("wip", f"actuator/{limit}"))
+    model = ModelBatch(forceful("wip", f"actuator/{law}"))
     ours, theirs = (sim.replay(model, scattered, start).coordinates for sim in (ANALYTIC, engine))
     np.testing.assert_allclose(theirs, ours, rtol=0.0, atol=ROUND_OFF)
     assert np.max(np.abs(ours - ANALYTIC.replay(model, means, start).coordinates)) > 1e3 * ROUND_OFF

@@ -180,9 +180,8 @@ class Effect:
             empty.
         non_smooth: Why slopes of its likelihood mislead; None where they do not.
         doubt: Relative standard deviation of its first number by what its law leaves open.
-        tolerance: What every machine has of it: standard deviations of numbers about their start, by symbol, in
-            multiples of the joint's `wipx.core.parameters.Scales`; of the logarithm where the start is not zero. Empty
-            where every machine has nothing of it.
+        tolerance: What every machine has of it: standard deviations of numbers about neutral, by symbol, in multiples
+            of the joint's `wipx.core.parameters.Scales`; empty where that is nothing.
         usual: Whether nearly every machine has it, so that less evidence will do.
         outside_vocabulary: Whether contract section 3 lacks it. A diagnosis names such an effect only where those of
             the contract leave something over.

@@ -38,7 +38,7 @@ class Scales:
         length: Size of the body [m].
         duration: Length of a recording [s].
         command: Largest force that was commanded [N or N m].
-        usual: Mean size of the force that was commanded, weighed by its square [N or N m].
+        usual: Root mean square of the force that was commanded [N or N m].
         turn: Angle between the ends of its way; of the wheel, where the joint slides on one [rad].
     """
 

@@ -3,7 +3,7 @@
 What it loses stays bounded where nothing was recorded: later than all recordings, and under larger forces.
 """
 
-from math import log, sqrt
+from math import sqrt
 
 from wipx.core.effect import Effect
 from wipx.core.law import law
@@ -25,13 +25,13 @@ EFFECT = Effect(
         Parameter(
             "t_0", "time at which nothing is lost; half of that after which no more is", "moment", 0.0, 0.0, 1.0, 0.5
         ),
-        Parameter("u_0", "force at which nothing is lost", "load", 0.0, 0.1, 2.0, 1.0),
+        Parameter("u_0", "force at which nothing is lost", "load", 0.0, 0.0, 4.0, 1.0),
     ),
     law="F = u (1 - d (min(t, 2 t_0) - t_0) - l (abs(u) - u_0) / (abs(u) + u_0))",
     linear_in=("d", "l"),
     source="Krishnan 2010, Permanent Magnet Synchronous and Brushless DC Motor Drives, ch. 1",
     outside_vocabulary=True,
-    tolerance={"d": 0.005, "l": 0.2, "u_0": log(2.0)},
+    tolerance={"d": 0.005, "l": 0.2},
     rows={"SAG_TIME": "d", "SAG_MIDDLE": "t_0", "SAG_LOAD": "l", "SAG_USUAL": "u_0"},
     parts=("SAG",),
     threshold=True,

@@ -220,7 +220,7 @@ def _joint_scales(model: Model, site: str, column: str, recordings: tuple[Record
         commanded = np.abs(_asked(model, site, recorded, np.concatenate([r[column] for r in recordings])))
     force = max(float(np.quantile(commanded, 0.99)), _inertia(model, site) * velocity / 0.1)
     largest = max(float(commanded.max()), 1e-6 * force)
-    usual = max(float(np.sum(commanded**3) / max(np.sum(commanded**2), 1e-300)), 1e-6 * force)
+    usual = max(float(np.sqrt(np.mean(commanded**2))), 1e-6 * force)
     if plant.tree is not None:
         body = next(link.body for link in plant.tree.links if link.joint == site)
         reach = [float(np.linalg.norm(link.place)) for link in plant.tree.links if link.place.any()]

@@ -34,7 +34,7 @@ from wipx.identify.smoothing import BANDWIDTHS
 from wipx.sim.analytic import AnalyticSimulator
 
 SHARE = STRIDE / HORIZON  # of a prediction that counts as independent of its neighbours
-DOUBTS = 5  # steps by which numbers in doubt are fitted; the middle of a sag needs them
+DOUBTS = 2  # steps by which numbers in doubt, which move by a few per cent, are fitted
 STEPS = (1.0, 0.3, 0.0)  # shares of the step to numbers that suit others, of which the best is taken
 STEP = 2.0  # times the simulator's usual step, exact enough where no law is
 

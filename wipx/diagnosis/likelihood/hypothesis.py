@@ -86,9 +86,8 @@ class Setting:
         law = effect_of(name, plant)
         for number, known in zip(effect_parameters(name, plant, self.scales), law.parameters, strict=True):
             if known.name in law.tolerance:
-                deviation = law.tolerance[known.name] * (number.start or sizes.of(known.dimension))
-                of_factor = number.start != 0.0
-                yield replace(number, prior_mean=number.start, prior_std=deviation, of_factor=of_factor)
+                deviation = law.tolerance[known.name] * sizes.of(known.dimension)
+                yield replace(number, start=number.neutral, prior_mean=number.neutral, prior_std=deviation)
 
     def _by_forces(self, number: FreeParameter) -> FreeParameter:
         """A number with the prior that recorded forces give it, where they do."""
