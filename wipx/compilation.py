@@ -1,7 +1,7 @@
 """Compile ahead what takes longest: the simulator, the laws beside other engines, and the filters along recordings.
 
-`python -m wipx.compilation` does all, as `make setup` does. A program that finds nothing compiled compiles the simulator
-and the filters while it runs (`wipx.sim.first_use`).
+`python -m wipx.compilation` does all, as `make setup` does. A program that finds nothing compiled compiles the
+simulator and the filters while it runs (`wipx.sim.first_use`).
 """
 
 import sys

@@ -94,9 +94,7 @@ def test_every_effect_works_in_every_engine(engine: SteppedSimulator, kind: str,
 
 @EVERY
 @pytest.mark.parametrize("law", ["dead_zone", "saturation", "speed_limit", "sag"])
-def test_drives_answer_to_commands_that_scatter_in_every_engine(
-    engine: SteppedSimulator, law: str, fresh_seed: int
-):
+def test_drives_answer_to_commands_that_scatter_in_every_engine(engine: SteppedSimulator, law: str, fresh_seed: int):
     t = uneven(np.random.default_rng(fresh_seed), 20)
     means = Inputs.of([t], [np.vstack([sines(t, 0.8), [[0.0]]])], [0], (3,))
     scattered = replace(means, spread=np.array([0.5]))
