@@ -21,7 +21,7 @@ LIMITS = {
     "actuator/saturation": {"F_max": 5.0},
     "actuator/speed_limit": {"F_stall": 6.0, "v_free": 1.2},
 }
-LAWS = {**LIMITS, "actuator/sag": {"d": 0.0, "l": 0.6, "t_0": 4.0, "u_0": 2.0}}
+LAWS = {**LIMITS, "actuator/sag": {"d": 0.0, "l": 0.15, "t_0": 4.0, "u_0": 2.0, "u_1": 10.0}}
 
 
 def noisily_driven(effect: str, seed: int) -> Recordings:

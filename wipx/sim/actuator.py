@@ -86,9 +86,8 @@ def actuator_path(S, J, n, on, has, j):
         for w in range(n):
             middle = J[R.SAG_MIDDLE * W + w]
             emptied = J[R.SAG_TIME * W + w] * (min(S[R.TIME * W + w], 2.0 * middle) - middle)
-            J[R.DRIVE * W + w] = sag.force(
-                J[R.DRIVE * W + w], emptied, J[R.SAG_LOAD * W + w], J[R.SAG_USUAL * W + w], J[R.SPREAD * W + w]
-            )
+            load, usual, most = J[R.SAG_LOAD * W + w], J[R.SAG_USUAL * W + w], J[R.SAG_MOST * W + w]
+            J[R.DRIVE * W + w] = sag.force(J[R.DRIVE * W + w], emptied, load, usual, most, J[R.SPREAD * W + w])
     if has[j, R.ON_GAIN]:
         for w in range(n):
             J[R.DRIVE * W + w] *= J[R.GAIN * W + w]

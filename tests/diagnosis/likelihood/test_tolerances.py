@@ -45,7 +45,7 @@ def test_a_gain_is_named_although_drives_sag(fresh_seed: int):
 def test_a_drive_that_sags_about_its_usual_force_has_no_other_gain(fresh_seed: int):
     moved = bench("wip", {}, fresh_seed, count=3)
     u = np.concatenate([recording["u"] for recording in moved.recordings])
-    sag = {"d": 0.0, "l": 0.3, "t_0": 1.5, "u_0": float(np.sqrt(np.mean(u**2)))}
+    sag = {"d": 0.0, "l": 0.1, "t_0": 1.5, "u_0": float(np.sqrt(np.mean(u**2))), "u_1": float(np.abs(u).max())}
     assert not beside_doubts(bench("wip", {DRIVE: sag}, fresh_seed, count=3), "actuator/gain")[1]
 
 
@@ -56,6 +56,6 @@ def test_numbers_within_tolerance_have_priors_and_others_are_given(fresh_seed: i
     moved = fitter.in_doubt(nominal).hypothesis
     free = {number.name: number for number in moved.space.free}
     assert free[f"{ENCODER}.s"].prior_std == pytest.approx(0.01)
-    assert free[f"{DRIVE}.l"].prior_std == pytest.approx(0.2)
-    assert not {f"{ENCODER}.n", f"{DRIVE}.t_0", f"{DRIVE}.u_0"} & set(free)
+    assert free[f"{DRIVE}.l"].prior_std == pytest.approx(0.07)
+    assert not {f"{ENCODER}.n", f"{DRIVE}.t_0", f"{DRIVE}.u_0", f"{DRIVE}.u_1"} & set(free)
     assert np.all(np.abs(moved.space.prior_residuals(moved.cube)) < 4.0)
