@@ -43,7 +43,7 @@ def measure_diagnosis() -> dict[str, float]:
     body = fitter.innovations_model.linear, fitter.innovations_model.jolts
     gains = observer_gains(*body, data, levels)
     batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], LEVELS, axis=0))
-    follow = (batch, gains, np.arange(LEVELS), np.zeros(LEVELS))
+    follow = (batch, gains, np.arange(LEVELS))
     innovations = fitter.innovations_model.innovations(*follow)
     parts = interleaved(
         {

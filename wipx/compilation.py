@@ -33,11 +33,11 @@ def compile_filters() -> None:
         pass
 
 
-def compile_by_use(simulator: Simulator) -> None:
-    """Let a simulator run; the analytic one has the filters compiled meanwhile."""
+def compile_simulator(simulator: Simulator | None = None) -> None:
+    """Compile a simulator, by default the analytic one, which has the filters compiled meanwhile."""
     plant = plant_of("pendulum")
     model = Model(plant, plant.complete(BODY, "compilation"), {})
-    simulator.replay(ModelBatch(model), Inputs.regular(0.01, 100.0, 1), np.zeros((2, 1, 1)))
+    (simulator or AnalyticSimulator()).replay(ModelBatch(model), Inputs.regular(0.01, 100.0, 1), np.zeros((2, 1, 1)))
 
 
 def main() -> int:
@@ -47,8 +47,8 @@ def main() -> int:
         Exit status.
     """
     if FILTERS[-1] not in sys.argv:
-        compile_by_use(AnalyticSimulator())
-        compile_by_use(BulletSimulator())
+        compile_simulator()
+        compile_simulator(BulletSimulator())
     if begun:
         return begun[0].wait()
     compile_filters()

@@ -169,7 +169,6 @@ class Effect:
         linear_at_rest: Kind of the law, itself or another with the same symbols, that small motions about rest feel;
             empty where it has no slope there.
         constant_force: Whether it acts as a constant force on a joint.
-        threshold: Whether it answers to single commands, not to their mean.
         stretch: Symbols of the ends of the stretch of the joint's way on which it acts.
         begins: Symbol of the time at which it begins to act.
         built_in: Parameter of joint or motor, as MuJoCo calls it, that physics engines have for it.
@@ -206,7 +205,6 @@ class Effect:
     steady: Steady | None = None
     linear_at_rest: str = ""
     constant_force: bool = False
-    threshold: bool = False
     stretch: tuple[str, str] | None = None
     begins: str = ""
     built_in: str = ""

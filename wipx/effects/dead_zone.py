@@ -22,7 +22,6 @@ EFFECT = Effect(
     steady=Steady("command", _steady, stage=1),
     rows={"DEAD_BAND": "band"},
     parts=("DEAD_ZONE",),
-    threshold=True,
 )
 
 

@@ -33,7 +33,6 @@ EFFECT = Effect(
     tolerance={"d": 0.005, "l": 0.07},
     rows={"SAG_TIME": "d", "SAG_MIDDLE": "t_0", "SAG_LOAD": "l", "SAG_USUAL": "u_0", "SAG_MOST": "u_1"},
     parts=("SAG",),
-    threshold=True,
 )
 
 

@@ -31,7 +31,6 @@ EFFECT = Effect(
     steady=Steady("command", _steady, stage=3),
     rows={"FORCE_MAX": "F_max"},
     parts=("SATURATION",),
-    threshold=True,
     scan="force_limits",
 )
 

@@ -31,7 +31,6 @@ EFFECT = Effect(
     source="torque-speed line of a DC motor, BAM documentation, github.com/Rhoban/bam",
     rows={"STALL": "F_stall", "FREE_SPEED": "v_free"},
     parts=("SPEED_LIMIT",),
-    threshold=True,
     scan="speed_limits",
     contains=Contains("saturation", when=_is_out_of_reach, symbols={"F_stall": "F_max"}),
 )

@@ -39,7 +39,6 @@ class Observer:
         gains: Shape (groups, K + 1, R, states, channels), from channels to states; zero where nothing was measured.
             States are coordinates, then rates, then accelerations that the observer adds to the model's, if it does.
         group: Which of the gains each model has, shape (P,).
-        spread: As `Inputs.spread`, but of each model, shape (P, inputs) [N or N m]; None for that of the inputs.
         reports: Whether to tell the forces of the drives.
         kept: Rows (W,) of recordings (W,) at which to tell what joints carry from step to step; None for none.
     """
@@ -47,7 +46,6 @@ class Observer:
     recorded: np.ndarray
     gains: np.ndarray
     group: np.ndarray
-    spread: np.ndarray | None = None
     reports: bool = False
     kept: tuple[np.ndarray, np.ndarray] | None = None
 
@@ -112,8 +110,6 @@ class AnalyticSimulator:
             run.report()
         if observer.kept is not None:
             run.keep(*observer.kept)
-        if observer.spread is not None:
-            run.coefficients.joints[run.layout.driven, R.SPREAD] = observer.spread.T
         run.advance(run.layout.states(initial), 0, run.layout.rows, observer=observer)
         return run.rollouts(inputs.commands[:, :, None, :])
 

@@ -55,7 +55,7 @@ def correlation(series: np.ndarray, lag: int) -> float:
 def test_innovations_of_the_true_model_are_white_and_of_unit_variance(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     gains = case.fitter.innovations_model.gains(LEVELS, case.nominal)
-    shown = case.fitter.innovations_model.innovations(ModelBatch(case.nominal), (gains,), np.zeros(1, int), np.zeros(1))
+    shown = case.fitter.innovations_model.innovations(ModelBatch(case.nominal), (gains,), np.zeros(1, int))
     series = shown[0, 0, 0, case.data.counted[:, 0]]
     n = len(series)
     assert np.mean(series**2) == pytest.approx(1.0, abs=4.5 * np.sqrt(2.0 / n))  # 4.5 standard deviations
@@ -67,7 +67,7 @@ def test_innovations_of_a_wrong_model_are_not(fresh_seed: int):
     case = pushed_carriage(np.random.default_rng(fresh_seed))
     wrong = unit_axis({"translation/coulomb": {"F_c": 0.2}})
     gains = case.fitter.innovations_model.gains(LEVELS, wrong)
-    shown = case.fitter.innovations_model.innovations(ModelBatch(wrong), (gains,), np.zeros(1, int), np.zeros(1))
+    shown = case.fitter.innovations_model.innovations(ModelBatch(wrong), (gains,), np.zeros(1, int))
     series = shown[0, 0, 0, case.data.counted[:, 0]]
     assert correlation(series, 1) > 10.0 / np.sqrt(len(series))
 
@@ -84,7 +84,7 @@ def test_innovations_after_missing_rows_are_no_larger_than_others(fresh_seed: in
     case = Bench(model, (recording,), {})
     levels = NoiseLevels(np.array([1e-3]), np.array([1e-6]))
     gains = case.fitter.innovations_model.gains(levels, model)
-    shown = case.fitter.innovations_model.innovations(ModelBatch(model), (gains,), np.zeros(1, int), np.zeros(1))
+    shown = case.fitter.innovations_model.innovations(ModelBatch(model), (gains,), np.zeros(1, int))
     behind = np.flatnonzero(recording.missing) + 1
     for later in range(3):
         assert np.mean(shown[0, 0, 0, behind[1:-1] + later] ** 2) < 2.0
@@ -109,7 +109,7 @@ def test_reports_after_missing_rows_do_not_count(fresh_seed: int):
     case = Bench(model, (recording,), {})
     follower = case.fitter.innovations_model
     gains = follower.gains(NoiseLevels(np.array([1e-3]), np.array([1e-6])), model)
-    reports = follower.innovations(ModelBatch(model), (gains,), np.zeros(1, int), np.zeros(1))[0, 0, 1]
+    reports = follower.innovations(ModelBatch(model), (gains,), np.zeros(1, int))[0, 0, 1]
     after = np.flatnonzero(recording.missing)[:, None] + 1 + np.arange(3)
     assert np.any(reports)
     assert not np.any(reports[after])

@@ -46,7 +46,7 @@ def test_the_winner_is_that_of_fits_to_the_end_with_no_more_steps(hidden: str, f
         begin = Hypothesis.of(case.setting, (candidate.effect,), candidate.values)
         own = starts.setdefault(candidate.effect, [])
         if len(own) < 2:
-            own.append(fitter.begun(begin, fitter.spread_for(begin.model, nominal.levels)))
+            own.append(fitter.begun(begin, nominal.levels))
     counts.clear()
     raced = race.run(lambda climbs: list(map(fitter.stepped, climbs)), nominal, list(starts.values()), STEPS)
     in_race = dict(counts)

@@ -5,10 +5,9 @@ freed of what the numbers already in the model can imitate, is compared with the
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -158,15 +157,9 @@ class Screening:
     def candidates(self, name: str) -> list[Candidate]:
         """Where to start for one effect."""
         effect = vocabulary(self.setting.nominal.plant)[name]
-        model = self.fit.hypothesis.model.with_effects({name: effect.neutral})
-        own = self._with_levels(self.fitter.spread_for(model, self.fit.levels))
         if effect.superposes:
-            return [own._regressed(name)]
-        return own._compared(name, own._atoms(name))
-
-    def _with_levels(self, levels: Any) -> "Screening":
-        """The same where the fit has other levels."""
-        return self if levels is self.fit.levels else replace(self, fit=replace(self.fit, levels=levels))
+            return [self._regressed(name)]
+        return self._compared(name, self._atoms(name))
 
     def _atoms(self, name: str) -> np.ndarray:
         """Values of an effect's numbers at which it is looked for, shape (A, parameters) [SI]."""

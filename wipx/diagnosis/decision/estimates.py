@@ -1,12 +1,11 @@
 """Numbers of a diagnosis: estimates with 95 % intervals, and bounds of what was not found."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from wipx.core.diagnosis import Bound
-from wipx.core.model import Model, ModelBatch
+from wipx.core.model import Model
 from wipx.core.plant import Plant
 from wipx.core.results import NINETY_FIVE, Estimate
 from wipx.diagnosis.candidates.screening import Candidate
@@ -16,8 +15,6 @@ from wipx.diagnosis.likelihood.sandwich import robust_deviations
 from wipx.diagnosis.likelihood.variation_between_runs import Scatter, scatter_of
 from wipx.effects.catalogue import effect_of
 from wipx.identify.parameter_space import ParameterSpace
-
-NUDGE = 0.05  # relative change of the spread, to see what it does
 
 
 def estimates(fitter: Fitter, fit: Fit, nominal: Fit) -> tuple[Estimate, ...]:
@@ -84,8 +81,7 @@ def deviations(fitter: Fitter, fit: Fit, nominal: Fit) -> np.ndarray:
     # A law is an approximation too: its misfit is let to be worth a small share of what it explains.
     wider = np.sqrt(1.0 + 2.0 * fitter.rules.answer.law_misfit * _explained(fit, nominal))
     chance = wider * robust_deviations(fit)
-    doubts = (shift_by_step(fitter, fit), wider * doubt_of_spread(fitter, fit), doubt_of_laws(fit))
-    return np.sqrt(chance**2 + sum(doubt**2 for doubt in doubts))
+    return np.sqrt(chance**2 + shift_by_step(fitter, fit) ** 2 + doubt_of_laws(fit) ** 2)
 
 
 def _explained(fit: Fit, nominal: Fit) -> float:
@@ -140,18 +136,6 @@ def doubt_of_laws(fit: Fit) -> np.ndarray:
         share[space.names.index(f"{effect}.{law.parameters[0].name}")] = law.doubt
     values = space.to_values(fit.hypothesis.cube)
     return np.abs(space.to_cube((1.0 + share) * values) - fit.hypothesis.cube)
-
-
-def doubt_of_spread(fitter: Fitter, fit: Fit) -> np.ndarray:
-    """What not knowing the spread of single commands adds to the standard deviations in the cube, shape (D,)."""
-    if fit.levels.spread == 0.0 or not len(fit.hypothesis.cube):
-        return np.zeros(len(fit.hypothesis.cube))
-    wider = replace(fit, levels=replace(fit.levels, spread=(1.0 + NUDGE) * fit.levels.spread))
-    slope = (fitter.white_of(wider, ModelBatch(fit.hypothesis.model))[0] - fit.white.ravel()) / NUDGE
-    jacobian = fit.jacobian[: slope.size]
-    shift = np.linalg.pinv(fit.information) @ (jacobian.T @ slope)
-    own = float(np.sum((slope - jacobian @ shift) ** 2))  # what numbers of the fit cannot imitate
-    return np.abs(shift) / np.sqrt(max(own, 1.0))
 
 
 def _meaning(model: Model, name: str) -> str:

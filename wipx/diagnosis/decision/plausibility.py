@@ -300,5 +300,5 @@ def _runs_away(fitter: InnovationFitter, fit: Fit) -> bool:
     innovations_model, levels = fitter.innovations_model, fit.levels
     batch = fit.hypothesis.space.batch(fit.hypothesis.cube)
     gains = innovations_model.gains(levels, fit.hypothesis.model)
-    innovations = innovations_model.innovations(batch, (gains,), np.zeros(1, dtype=np.int64), np.array([levels.spread]))
+    innovations = innovations_model.innovations(batch, (gains,), np.zeros(1, dtype=np.int64))
     return float(np.mean(np.abs(innovations) >= LARGEST)) > fitter.rules.plausibility.run_away

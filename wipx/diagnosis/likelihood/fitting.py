@@ -236,10 +236,6 @@ class Fitter(ABC):
         """Levels from which a fit sees less of a misfit that it got stuck in."""
 
     @abstractmethod
-    def spread_for(self, model: Model, levels: Any) -> Any:
-        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
-
-    @abstractmethod
     def refined(self) -> Self:
         """The same with half the step of the simulator."""
 

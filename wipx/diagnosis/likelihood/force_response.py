@@ -29,7 +29,7 @@ def motion_of(fitter: InnovationFitter, fit: Fit) -> dict[str, np.ndarray]:
     data = fitter.data
     plant = data.plant
     gains = fitter.innovations_model.gains(fit.levels, fit.hypothesis.model)
-    state = fitter.innovations_model.estimated(fit.hypothesis.model, gains, fit.levels.spread)
+    state = fitter.innovations_model.estimated(fit.hypothesis.model, gains)
     signals = {name: state[:, i] for i, name in enumerate((*plant.coordinates, *plant.rates))}
     for c, name in enumerate(plant.commands):
         commands = data.inputs.commands[:, c]

@@ -46,12 +46,10 @@ class PredictionStarts:
     Attributes:
         bandwidths: Of the filter that estimates the states, shape (joints,) [rad/s].
         filter: Itself; the states follow each model.
-        spread: Of single commands about their mean: none.
     """
 
     bandwidths: np.ndarray
     filter: Filter
-    spread: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -317,10 +315,6 @@ class ForecastFitter(Fitter):
     def escape_levels(self, fit: Fit) -> PredictionStarts:
         """Starts by the fit itself, of the best filter near its own."""
         return self.prediction_starts(fit.hypothesis.model, self._near(fit))
-
-    def spread_for(self, model: Model, levels: PredictionStarts) -> PredictionStarts:
-        """The same starts: commands are taken as the log has them."""
-        return levels
 
     def seen_by_row(self, fit: Fit) -> tuple[InnovationFitter, Fit]:
         """A fit as its innovations show it."""

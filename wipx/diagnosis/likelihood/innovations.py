@@ -21,13 +21,11 @@ from wipx.diagnosis.likelihood.observer import NoiseLevels
 from wipx.diagnosis.likelihood.recording_batch import RecordingBatch
 from wipx.diagnosis.likelihood.sandwich import stretches
 from wipx.diagnosis.rules import USUAL, EvidenceRules, Rules
-from wipx.effects.catalogue import kind_of
 from wipx.sim.analytic import AnalyticSimulator
 
 LEVEL_STEPS = (1.5, 0.75, 0.375)  # of the noise levels' logarithms
 LEVEL_RANGE = 14.0  # of the same, about the first guess
 LEVEL_GAIN = 0.3  # nats at which a round of the search goes on
-SPREAD = 1.15  # factor by which the spread of single commands is changed first, ever more as long as it gains
 LOUDER = 30.0  # times the noise of the forces, from which a fit is searched once more
 
 
@@ -175,8 +173,7 @@ class InnovationFitter(Fitter):
     def errors_of(self, batch: ModelBatch, levels: NoiseLevels, model: Model) -> np.ndarray:
         """Innovations, shape (P, R, m, K + 1)."""
         gains = self.innovations_model.gains(levels, model)
-        same = np.zeros(batch.size, dtype=np.int64)
-        return self.innovations_model.innovations(batch, (gains,), same, np.full(batch.size, levels.spread))
+        return self.innovations_model.innovations(batch, (gains,), np.zeros(batch.size, dtype=np.int64))
 
     def noise_of(self, errors: np.ndarray, levels: NoiseLevels, model: Model) -> list[NoiseModel]:
         """The noise model of each model's innovations."""
@@ -190,8 +187,7 @@ class InnovationFitter(Fitter):
 
     def first_fit(self, hypothesis: Hypothesis, levels: NoiseLevels) -> Fit:
         """From noise levels of another fit on, which may be far off."""
-        fit = self.fit(hypothesis, self.spread_for(hypothesis.model, levels))
-        return self._alternated(fit, afresh=True)
+        return self._alternated(self.fit(hypothesis, levels), afresh=True)
 
     def converged(self, fit: Fit, *, rounds: int = 4) -> Fit:
         """Noise levels and values in turn until neither gains more."""
@@ -202,8 +198,6 @@ class InnovationFitter(Fitter):
             before = fit.log_likelihood
             steps = LEVEL_STEPS if k == 0 else LEVEL_STEPS[-1:]
             fit = self.refit(fit, self.levels_of(fit, steps, afresh=afresh and k == 0))
-            if fit.log_likelihood - before < CONVERGED or k == rounds - 1:
-                fit = self._with_best_spread(fit)
             if fit.log_likelihood - before < CONVERGED:
                 break
         return fit
@@ -220,9 +214,8 @@ class InnovationFitter(Fitter):
             steps: Of the logarithms, the longest first.
             afresh: Whether the levels may be far off. Then they are also changed one by one where no step of all gains.
         """
-        levels = self.spread_for(fit.hypothesis.model, fit.levels)
-        search = _LevelSearch(self, fit.hypothesis, levels)
-        centre = best = _logarithms(levels)
+        search = _LevelSearch(self, fit.hypothesis, fit.levels)
+        centre = best = _logarithms(fit.levels)
         free = self._free_levels
         for step in steps:
             move = np.zeros_like(best)
@@ -242,7 +235,7 @@ class InnovationFitter(Fitter):
                 if there is None:
                     break
                 best = there
-        return levels if best is centre else _levels(best, levels)
+        return fit.levels if best is centre else _levels(best, fit.levels)
 
     @cached_property
     def _free_levels(self) -> tuple[tuple[int, ...], ...]:
@@ -255,34 +248,6 @@ class InnovationFitter(Fitter):
             if not self.joints or set(own) & set(self.joints)
         )
 
-    def spread_for(self, model: Model, levels: NoiseLevels) -> NoiseLevels:
-        """Levels for a model, with a first guess of the spread of single commands where its drive has a threshold."""
-        matters = self.data.has_means and any(kind_of(name).threshold for name in model.effects)
-        if matters == (levels.spread > 0.0):
-            return levels
-        return replace(levels, spread=1.0 if matters else 0.0)
-
-    def _with_best_spread(self, fit: Fit) -> Fit:
-        """A fit with the spread of single commands that suits it best, where it has one.
-
-        Thresholds are tied to the spread, so the values follow it at every try.
-        """
-        for factor in (SPREAD, 1.0 / SPREAD) if fit.levels.spread > 0.0 else ():
-            change = factor
-            while True:
-                there = self._at_spread(fit, change)
-                if there.log_likelihood > fit.log_likelihood + LEVEL_GAIN:
-                    fit, change = there, change**2
-                elif change != factor:
-                    change = factor
-                else:
-                    break
-        return fit
-
-    def _at_spread(self, fit: Fit, change: float) -> Fit:
-        levels = replace(fit.levels, spread=change * fit.levels.spread)
-        return self.refit(fit, levels, steps=3)
-
     def likelihoods_of(self, hypotheses: Sequence[Hypothesis], levels: NoiseLevels) -> np.ndarray:
         """Log-likelihoods of hypotheses of the same effects, as they are."""
         cubes = np.stack([hypothesis.cube for hypothesis in hypotheses])
@@ -291,7 +256,7 @@ class InnovationFitter(Fitter):
         different, group = np.unique(alike, return_inverse=True)
         observers = tuple(gains[i] for i in different)
         batch = hypotheses[0].space.batch(cubes)
-        innovations = self.innovations_model.innovations(batch, observers, group, np.full(batch.size, levels.spread))
+        innovations = self.innovations_model.innovations(batch, observers, group)
         scales = [_log_determinants(observer.whitening, self.innovations_model.data).sum() for observer in observers]
         priors = 0.5 * np.sum(hypotheses[0].space.prior_residuals(cubes) ** 2, axis=1)
         data = self.innovations_model.data
@@ -307,8 +272,7 @@ class InnovationFitter(Fitter):
         gains = self.innovations_model.gains_of(levels, hypothesis.model)
         count = len(levels)
         batch = hypothesis.space.batch(np.repeat(hypothesis.cube[None], count, axis=0))
-        spread = np.array([level.spread for level in levels])
-        innovations = self.innovations_model.innovations(batch, gains, np.arange(count), spread)
+        innovations = self.innovations_model.innovations(batch, gains, np.arange(count))
         priors = hypothesis.space.prior_residuals(hypothesis.cube)[0]
         found = []
         for g, each in zip(gains, innovations, strict=True):
@@ -365,7 +329,7 @@ def _logarithms(levels: NoiseLevels) -> np.ndarray:
 def _levels(logarithms: np.ndarray, like: NoiseLevels) -> NoiseLevels:
     values = np.exp(logarithms)
     joints = len(like.force)
-    return NoiseLevels(values[:joints], values[joints:], like.spread)
+    return NoiseLevels(values[:joints], values[joints:])
 
 
 def _single_moves(free: Sequence[Sequence[int]], step: float, count: int) -> list[np.ndarray]:

@@ -70,19 +70,16 @@ class InnovationsModel:
             known |= fresh
         return tuple(gains for gains in (known[key] for key in keys) if gains is not None)
 
-    def innovations(
-        self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray
-    ) -> np.ndarray:
+    def innovations(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray) -> np.ndarray:
         """Innovations in standard deviations of the observer, then errors of reported forces, shape (P, R, m, K + 1).
 
         Args:
             batch: P models.
             gains: Of one or more observers.
             group: Which of them each model has, shape (P,).
-            spread: Of the single commands, in multiples of `Inputs.spread`, shape (P,).
         """
         data = self.data
-        shown = self._shown(batch, gains, group, spread)
+        shown = self._shown(batch, gains, group)
         whitening = gains[0].whitening[None] if len(gains) == 1 else np.stack([g.whitening for g in gains])
         found = np.zeros((batch.size, len(data.recordings), data.signals, len(data.rows)))
         _innovations(
@@ -95,12 +92,12 @@ class InnovationsModel:
                 found[:, r, motion:, k : k + TAPS] = 0.0
         return found
 
-    def estimated(self, model: Model, gains: Gains, spread: float) -> np.ndarray:
+    def estimated(self, model: Model, gains: Gains) -> np.ndarray:
         """Coordinates and rates that a model expects before it sees each row, shape (K + 1, 2 joints, R)."""
-        shown = self._shown(ModelBatch(model), (gains,), np.zeros(1, dtype=np.int64), np.array([spread]))
+        shown = self._shown(ModelBatch(model), (gains,), np.zeros(1, dtype=np.int64))
         return np.concatenate([shown.coordinates, shown.rates], axis=1)[:, :, 0]
 
-    def _shown(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray, spread: np.ndarray) -> Rollouts:
+    def _shown(self, batch: ModelBatch, gains: tuple[Gains, ...], group: np.ndarray) -> Rollouts:
         start = true_states(batch, np.repeat(self._first_rows[:, None], batch.size, axis=1))
         corrections = gains[0].gains[None] if len(gains) == 1 else np.stack([g.gains for g in gains])
         return self.simulator.follow(
@@ -111,7 +108,6 @@ class InnovationsModel:
                 self.data.measured[:, : self.data.seen],
                 corrections,
                 group,
-                np.outer(spread, self.data.inputs.spread),
                 reports=self.data.reported.shape[1] > 0,
             ),
         )

@@ -85,7 +85,7 @@ class _Likelihood:
     def of(cls, model: InnovationsModel, fit: Fit) -> "_Likelihood":
         data, fitted = model.data, fit.hypothesis.model
         gains = model.gains(fit.levels, fitted)
-        surprises = data.measured - model.estimated(fitted, gains, fit.levels.spread)
+        surprises = data.measured - model.estimated(fitted, gains)
         surprises[~data.rows[:, None].repeat(surprises.shape[1], 1)] = 0.0
         corrections = np.einsum("krij,kjr->kri", gains.gains, surprises[:, : gains.gains.shape[3]])
         size = 2 * data.joints

@@ -28,13 +28,10 @@ class NoiseLevels:
     Attributes:
         force: On each joint, shape (joints,), spectral [N s^0.5 or N m s^0.5].
         sensor: Of each recorded channel, shape (m,) [unit of the column].
-        spread: Half width by which single commands scatter about the mean that the log has, in multiples of that by
-            white noise (`Inputs.spread`).
     """
 
     force: np.ndarray
     sensor: np.ndarray
-    spread: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -293,17 +293,16 @@ class FitStore:
         beside = nonsmooth_search.beside(fit, name)
         alone = self._with(fit, name, [{**others, **start} for others in beside for start in own])
         roomy = self._with(fit, name, [values for start in candidates for values in start.moved])
-        levels = self.fitter.spread_for(alone[0].model, fit.levels)
         count = 1 if self.is_of_part else STARTS
         if nonsmooth_search.is_drive_delay(name):
             first = alone[:: len(own)]
-            alone += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, levels)]
+            alone += [late for begin in first for late in nonsmooth_search.delays(self.fitter, begin, name, fit.levels)]
             count = nonsmooth_search.PEAKS
         every = [*roomy, *alone]
-        likelihoods = self.fitter.likelihoods_of(every, levels)
+        likelihoods = self.fitter.likelihoods_of(every, fit.levels)
         ranked = [every[i] for i in np.argsort(-likelihoods)]
         chosen = ranked[:1] if count == 1 else _first_of(ranked, roomy, 1) + _first_of(ranked, alone, count - 1)
-        return EffectStarts(name, chosen, levels, float(likelihoods.max()))
+        return EffectStarts(name, chosen, fit.levels, float(likelihoods.max()))
 
     def _begun(self, starts: EffectStarts) -> list[Climb]:
         return [self.fitter.begun(begin, starts.levels) for begin in starts.hypotheses]
