@@ -53,6 +53,7 @@ def forceful(kind: str, name: str) -> Model:
         "resonance": {"m": 0.3, "f": 4.0, "zeta": 0.05},
         "sticky_spot": {"F_c": 1.0, "lo": -0.05, "hi": 0.2},
         "saturation": {"F_max": 0.2},
+        "sag": {"d": 0.05, "l": 0.2, "t_0": 0.1, "u_0": 0.3, "u_1": 2.0},
         "ripple": {"A": 0.3, "n": 8.0, "phase": 0.4},
         "payload": {"mass": 0.5, "height": 0.6},
         "payload_event": {"mass": 0.5, "height": 0.6, "t0": 0.0713},
