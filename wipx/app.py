@@ -18,6 +18,7 @@ from typing import Any, cast
 
 import hydra
 import yaml
+from hydra._internal.hydra import Hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
 from hydra.types import RunMode
@@ -76,7 +77,7 @@ def main() -> int:
         arguments = unambiguous(spelled_out(renamed(sys.argv[1:])))
         # Hydra does not read overrides on both sides of a flag.
         sys.argv[1:] = sorted(arguments, key=lambda argument: argument.startswith(FLAGS))
-        with watch_ended():
+        with watch_ended(), _composed_once():
             hydra.main(version_base="1.3", config_path=str(configuration_folder()), config_name="config")(run)()
     except RunFailed as failure:
         return _report(failure.error, explanation(failure.error))
@@ -90,6 +91,17 @@ def main() -> int:
     except SystemExit as stop:  # after --help, or after Hydra has refused a flag
         return INPUT_AT_FAULT if stop.code else DONE
     return DONE
+
+
+@contextmanager
+def _composed_once() -> Iterator[None]:
+    """Keep Hydra from composing a configuration twice, the first time to see whether it asks for a sweep; -m does."""
+    get_mode = Hydra.get_mode
+    Hydra.get_mode = lambda *_, **__: None
+    try:
+        yield
+    finally:
+        Hydra.get_mode = get_mode
 
 
 def configuration_folder() -> Path:
