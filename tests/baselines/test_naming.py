@@ -21,7 +21,7 @@ NAMING = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if n == "all_at_once" else []) for n in NAMING]
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in ("all_at_once", "paper") else []) for n in NAMING]
 )
 @pytest.mark.parametrize(
     "effects", [COULOMB, pytest.param(VISCOUS, marks=pytest.mark.slow)], ids=["coulomb", "viscous"]

@@ -151,7 +151,12 @@ class Stopping(Feedback):
 @real_time
 @pytest.mark.parametrize(
     ("number", "reason"),
-    [(signal.SIGKILL, "is lost"), (signal.SIGSTOP, "no (reply from the motor|message from the IMU) for .* ms")],
+    [
+        (signal.SIGKILL, "is lost"),
+        pytest.param(
+            signal.SIGSTOP, "no (reply from the motor|message from the IMU) for .* ms", marks=pytest.mark.slow
+        ),
+    ],
 )
 def test_hardware_that_dies_ends_the_trials_with_one_line_and_what_was_recorded_is_kept(
     start, operator, capsys: pytest.CaptureFixture[str], number: signal.Signals, reason: str

@@ -23,6 +23,20 @@ ROBOT = (
 SEARCH = ("optimizer=least_squares", "optimizer.starts=1")
 
 
+@pytest.fixture(scope="module")
+def trials(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for trials, which are recorded by the first test that needs them."""
+    return tmp_path_factory.mktemp("trials")
+
+
+@pytest.fixture
+def with_trials(program: Program, tmp_path: Path, trials: Path) -> Program:
+    """The program in a folder that shares its trials with other tests."""
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "trials").symlink_to(trials)
+    return program
+
+
 def result(folder: Path) -> dict:
     return json.loads((folder / "result.json").read_text())["result"]
 
@@ -95,11 +109,11 @@ def test_a_sweep_gives_a_table_and_one_with_a_failed_job_does_not(program: Progr
         (("target=recordings", "target.path=nowhere"), "nowhere"),
     ],
 )
-def test_bad_input_is_one_line(program: Program, change: tuple[str, ...], expected: str):
+def test_bad_input_is_one_line(with_trials: Program, change: tuple[str, ...], expected: str):
     keep = [a for a in ROBOT if not (a.startswith(("target", "sim@target")) and change[0].startswith("target"))]
     keep = [a for a in keep if not (a.startswith("objective") and change[0].startswith("objective"))]
     keep = [a for a in keep if a.partition("=")[0] != change[0].partition("=")[0]]
-    answer = program("task=adapt", "method=pure_sim", *keep, *change, "hydra.run.dir=bad")
+    answer = with_trials("task=adapt", "method=pure_sim", *keep, *change, "hydra.run.dir=bad")
     assert answer.status == 2
     assert expected in answer.error
     assert len(answer.error.strip().splitlines()) == 1
@@ -135,7 +149,9 @@ def test_a_model_that_was_completed_before_is_taken_as_it_is(program: Program, t
         (("method=diagnosed", "model.path=m.yaml"), "m.yaml"),
     ],
 )
-def test_a_model_and_a_method_that_do_not_fit_are_refused(program: Program, arguments: tuple[str, ...], expected: str):
-    answer = program("task=adapt", *arguments, *ROBOT, "hydra.run.dir=bad")
+def test_a_model_and_a_method_that_do_not_fit_are_refused(
+    with_trials: Program, arguments: tuple[str, ...], expected: str
+):
+    answer = with_trials("task=adapt", *arguments, *ROBOT, "hydra.run.dir=bad")
     assert answer.status == 2
     assert expected in answer.error

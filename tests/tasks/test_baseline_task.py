@@ -46,6 +46,7 @@ def test_the_task_writes_what_the_contract_asks_for(tmp_path: Path, monkeypatch:
     assert metrics["rms"]["theta"] < 0.5 * metrics["rms_nominal"]["theta"]
 
 
+@pytest.mark.slow
 def test_the_task_leaves_a_network_that_a_prediction_adds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_seed: int
 ):

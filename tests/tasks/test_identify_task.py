@@ -81,6 +81,7 @@ def test_the_run_is_logged(program, folder, tmp_path: Path):
     assert {"model.yaml", "metrics.json", "report.html", "fit.png"} <= artifacts
 
 
+@pytest.mark.slow
 def test_bounds_may_be_whole_numbers(program, folder, tmp_path: Path):
     arguments = ("bounds={pitch/coulomb.F_c: [0, 1]}", f"recordings.path={folder.path}", "hydra.run.dir=out")
     answer = program(*FAST, *arguments)
