@@ -19,8 +19,7 @@ from wipx.diagnosis.selection.nested_laws import effects_in_parts, laws_with_con
 from wipx.effects.catalogue import effect_of, kind_of
 
 DOUBTED = 4.0  # times what an effect must gain, below which the fit without it is searched by trial too
-PAIRED = 2  # effects that were not worth it alone, beside which others are sought
-TOGETHER = 3  # effects that are worth it together only, at most
+PAIRED = 2  # effects that were not worth it alone, for which a second is sought
 
 History = tuple[ConsideredEffect, ...]
 
@@ -114,7 +113,7 @@ class Search:
                 best = self._worth_it(current, choices, fleeting)
             if best is None:
                 considered += _step(current, extended, None, fleeting)
-                best = self._together(current, extended)
+                best = self._pair(current, extended)
                 if best is None:
                     break
                 gain = evidence(current, best)
@@ -254,16 +253,15 @@ class Search:
         """Whether an effect that is not worth it alone gains enough for a second one to be sought beside it."""
         return one.log_likelihood - current.log_likelihood >= self.rules.expected_share * self.rules.least_gain
 
-    def _together(self, current: Fit, extended: list[Fit]) -> Fit | None:
-        """The fit with a few effects more that are worth it together only, if any are."""
+    def _pair(self, current: Fit, extended: list[Fit]) -> Fit | None:
+        """The fit with two effects more of which neither is worth it alone, if the two are."""
+        if len(current.effects) + 2 > self.store.fitter.own_rules.unproven:
+            return None
         for one in extended[:PAIRED]:
-            fit = one if self.is_worth_pairing(current, one) else None
-            while fit is not None and len(fit.effects) < len(current.effects) + TOGETHER:
-                larger = self.preferred(self.store.extensions(fit), current)
-                if larger is not None and self.criteria.gains_enough(current, larger):
-                    if self._transfers(current, larger):
-                        return larger
-                fit = larger if larger is not None and len(larger.effects) > len(fit.effects) else None
+            if self.is_worth_pairing(current, one):
+                two = self.preferred(self.store.extensions(one), current)
+                if two is not None and self.criteria.gains_enough(current, two):
+                    return two
         return None
 
     def _with_fewer(self, fit: Fit) -> Chosen:
