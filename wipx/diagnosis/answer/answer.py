@@ -50,8 +50,8 @@ def answered(context: Context, search: Search, rest: Rest, shapes: list[Shape]) 
     effects, minor = _effects(context, search, rest, repeated, ends, shapes)
     unruly = context.unruly_joints(fit)
     wrong = not context.is_quiet(fit) or context.is_worse(fit) or bool(unruly)
-    left = rest.significant or (fitted.times_the_floor > rules.trust.far_off and wrong)
-    matters = left and fitted.times_the_floor > rules.trust.near_floor
+    far = fitted.times_the_floor > rules.trust.near_floor
+    left, matters = rest.significant or (far and wrong), far and (rest.significant or wrong)
     verdict: Verdict = "unexplained" if left else "mismatch" if effects else "consistent"
     unexplained = replace(_unexplained(context, rest, unruly), significant=left)
     parts = search.split(fit)
