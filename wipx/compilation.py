@@ -23,7 +23,8 @@ BODY = {"body_mass": 1.0, "com_height": 0.5, "body_inertia": 0.1}
 
 def compile_filters() -> None:
     """Compile the filters, unless another process does."""
-    import wipx.diagnosis.pipeline  # noqa: F401  # with all of them
+    import wipx.control.motion  # with their own
+    import wipx.diagnosis.pipeline  # noqa: F401  # with all others
 
     try:
         with FileLock(compiled_folder() / "filters.lock", timeout=0):

@@ -10,6 +10,7 @@ from sim.robots import PARAMETERS
 
 from wipx.app import configuration_folder
 from wipx.config import build
+from wipx.control import motion
 from wipx.control.ekf import Ekf
 from wipx.control.lqr import Lqr
 from wipx.control.regulator import Regulator
@@ -20,6 +21,7 @@ from wipx.effects.catalogue import check_together, effect_of
 from wipx.hardware.excitations import excitation
 from wipx.hardware.target import Trial
 from wipx.hardware.testbed import EmulatedTestbed
+from wipx.sim.cache import AHEAD
 from wipx.sim.simulator import StateFeedback
 
 COLUMNS = ("t", "x", "theta", "x_dot", "theta_dot", "u", "u_measured")
@@ -91,6 +93,13 @@ def test_a_trial_that_follows_a_reference_records_it():
     (run,) = record(bed, Trial("r.csv", 0.5, reference=reference))
     assert set(run.columns) == {*COLUMNS, "x_ref", "theta_ref", "x_dot_ref"}
     np.testing.assert_allclose(np.gradient(run["x_ref"], run.t)[1:-1], run["x_dot_ref"][1:-1], atol=2e-3)
+
+
+def test_the_controllers_filter_is_compiled_ahead_for_its_arrays():
+    record(BED, Trial("r.csv", 0.05))
+    for kernel, types in AHEAD:
+        if kernel in (motion.propagate, motion.correct):
+            assert kernel.signatures == [types]
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,13 @@ out: an estimator that sees the sensors every 1.5 ms takes what little they do i
 import math
 
 import numpy as np
+from numba import boolean, float64
 
 from wipx.core.law import clip, inlined, law, sin_cos
 from wipx.effects import dead_zone, quadratic_drag, stribeck
 from wipx.sim import body as B
 from wipx.sim import rows as R
-from wipx.sim.cache import cached
+from wipx.sim.cache import cached_for, floats
 
 LONGEST = 2e-3  # [s] of a step; the midpoint rule then errs by 1e-7 of the pitch of a body that falls at 7 1/s
 REACH = 1e-5  # [m, rad, m/s, rad/s] of central differences; far below the speeds over which friction builds up
@@ -102,7 +103,7 @@ def spread(y, step, density, c, joints, double):
     return added
 
 
-@cached
+@cached_for(floats(1), floats(2), floats(1), float64, floats(1), floats(2), boolean, floats(1), floats(1))
 def propagate(y, covariance, commands, duration, c, joints, double, ease, density):
     """State and covariance after a `duration` under held commands.
 
@@ -138,7 +139,7 @@ def propagate(y, covariance, commands, duration, c, joints, double, ease, densit
     return y, covariance
 
 
-@cached
+@cached_for(floats(1), floats(2), floats(1), floats(1), floats(1), floats(1))
 def correct(y, covariance, measured, scale, offset, variance):
     """State and covariance after a reading of independent channels, one after the other.
 

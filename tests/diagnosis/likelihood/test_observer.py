@@ -17,10 +17,12 @@ from wipx.core.model import ModelBatch
 from wipx.core.recording import Recording
 from wipx.diagnosis.likelihood.hypothesis import Hypothesis
 from wipx.diagnosis.likelihood.innovations import InnovationFitter
+from wipx.diagnosis.likelihood.innovations_model import _report_errors
 from wipx.diagnosis.likelihood.observer import BEFORE, DIFFUSE, UNSETTLED, Gains, NoiseLevels, observer_gains
 from wipx.diagnosis.likelihood.recording_batch import SETTLES, RecordingBatch
 from wipx.identify.linearisation import Linearisation, linearise_along, transition_over
 from wipx.sim.analytic import Observer
+from wipx.sim.cache import AHEAD
 from wipx.sim.inputs import Inputs
 
 DT = 0.004  # [s]
@@ -113,6 +115,8 @@ def test_reports_after_missing_rows_do_not_count(fresh_seed: int):
     after = np.flatnonzero(recording.missing)[:, None] + 1 + np.arange(3)
     assert np.any(reports)
     assert not np.any(reports[after])
+    (ahead,) = ([types] for kernel, types in AHEAD if kernel is _report_errors)
+    assert _report_errors.signatures == ahead
     assert np.abs(reports[:-1]).max() < 10.0 * np.median(np.abs(reports[:-1]))
 
 

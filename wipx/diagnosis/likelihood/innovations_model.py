@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numba import int64
 
 from wipx.core.law import inlined
 from wipx.core.model import Model, ModelBatch
@@ -15,7 +16,7 @@ from wipx.identify.linearisation import Linearisation, linearise_along
 from wipx.identify.sensors import true_states
 from wipx.identify.unlogged_commands import jolts
 from wipx.sim.analytic import AnalyticSimulator, Observer
-from wipx.sim.cache import cached
+from wipx.sim.cache import booleans, cached, cached_for, floats, integers
 from wipx.sim.simulator import Rollouts
 
 GUESS_SPAN = 0.05  # [s] of rows from which the first rates are read
@@ -155,7 +156,7 @@ def _innovations(measured, coordinates, rates, channels, whitening, group, last,
                         out[p, r, c, k] = min(max(total, -LARGEST), LARGEST) if total == total else LARGEST
 
 
-@cached
+@cached_for(floats(3), floats(4), booleans(2), integers(1), int64, floats(4))
 def _report_errors(reported, delivered, counted, last, first, out):
     """Reported forces minus a + sum_i b_i F[k - i] of the modelled force F, by least squares for each model.
 
