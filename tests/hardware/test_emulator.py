@@ -94,7 +94,7 @@ def trials(emulated: Emulated, loop: Feedback, *plan: Trial) -> Iterator[Recordi
 
 
 @real_time
-@pytest.mark.parametrize("options", [(), ("--lines=pty",)])
+@pytest.mark.parametrize("options", [(), pytest.param(("--lines=pty",), marks=pytest.mark.slow)])
 def test_the_robot_balances_at_the_end_of_both_lines(start, operator, options: tuple[str, ...]):
     emulated = start(*options, "--pitch", "0.03")
     asked = operator()

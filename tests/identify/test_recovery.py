@@ -24,7 +24,8 @@ CASES: dict[str, tuple[str, Effects]] = {
         {"joint1/coulomb": {"F_c": 0.08}, "joint2/coulomb": {"F_c": 0.05}, "joint2/viscous": {"sigma": 0.01}},
     ),
 }
-LONG = {"axis friction", "cartpole friction"}  # two laws of friction at one joint, as on the pendulum
+# Two laws of friction at one joint, as on the pendulum.
+LONG = {"axis friction", "cartpole friction", "double pendulum friction"}
 # Noise alone moves the numbers by 1 to 4 %; a joint that sticks in one window of a fresh draw can
 # hold a search 5 % off, seldom more.
 TOLERANCE = 0.15

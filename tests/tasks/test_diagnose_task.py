@@ -78,6 +78,7 @@ def needs_nothing_from_outside(page: str) -> None:
     assert not re.search(r"<script[^>]+src=", page)
 
 
+@pytest.mark.slow
 def test_suspects_are_answered_in_all_results(program, axis: Path, tmp_path: Path):
     suspects = "task.suspects={translation/coulomb: {F_c: 0.5}, actuator/delay: {}}"
     answer = program("task=diagnose", suspects, f"recordings.path={axis}", "hydra.run.dir=out")

@@ -42,6 +42,7 @@ def robot(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_named_effects_are_identified_and_predict(program, robot: Path, tmp_path: Path):
     named = "effects=[shoulder/coulomb,actuator_elbow/gain,wrist/viscous]"
     common = ("free={hand.mass: 0.1}", "friction=none", "optimizer.starts=1", f"recordings.path={robot}")

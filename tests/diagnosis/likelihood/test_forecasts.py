@@ -111,6 +111,7 @@ def test_a_recording_that_is_left_out_does_not_count(fresh_seed: int):
     assert others.by_recording(fit, fit.white)[0] == 0.0
 
 
+@pytest.mark.slow
 def test_what_stays_is_told(fresh_seed: int):
     case = shaken(bench("linear_axis", FRICTION, fresh_seed, count=3), np.random.default_rng(fresh_seed))
     answer = diagnose(case.recordings, KnownRobot(case.nominal, {}), SIMULATOR)

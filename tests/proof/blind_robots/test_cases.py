@@ -148,7 +148,7 @@ def test_a_wrong_parameter_is_listed_as_uncertain():
     assert wrong
 
 
-@pytest.mark.parametrize("tier", ["single_clear", "poor_logging"])
+@pytest.mark.parametrize("tier", ["single_clear", pytest.param("poor_logging", marks=pytest.mark.slow)])
 def test_written_cases_are_read_and_the_diagnosis_sees_no_truth(tmp_path: Path, tier: str, fresh_seed: int):
     files = case_files(draw_case(np.random.default_rng(fresh_seed), tier))
     for part, texts, fewest in (("visible", files.visible, 4), ("unseen", files.unseen, 3)):

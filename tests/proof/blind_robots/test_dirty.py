@@ -87,6 +87,7 @@ def test_every_dominant_effect_matters(case: Case):
     assert all(share >= max(OWN, OVER_DIRT * SHARE[0]) for share in shares.values())
 
 
+@pytest.mark.slow
 def test_a_robot_with_dirt_only_has_nothing_to_be_named(dirt_only: Case):
     assert dirt_only.hidden.effects == {}
     assert dirt_only.dirt is not None
