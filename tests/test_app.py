@@ -174,8 +174,9 @@ def test_an_interrupted_run_says_so(command_line: CommandLine):
     assert command_line("task.behaviour=interrupt") == Answer(130, "", "interrupted; the run was not finished\n")
 
 
-def test_a_sweep_gives_every_job_the_folder_of_its_label(command_line: CommandLine):
-    answer = command_line("name=seeds", "label=seed_${seed}", "-m", "seed=1,2")
+@pytest.mark.parametrize("sweep", ["-m", "hydra.mode=MULTIRUN"])
+def test_a_sweep_gives_every_job_the_folder_of_its_label(command_line: CommandLine, sweep: str):
+    answer = command_line("name=seeds", "label=seed_${seed}", sweep, "seed=1,2")
     assert (answer.status, answer.out) == (0, "")
     results = sorted(
         path.relative_to(command_line.folder).as_posix() for path in command_line.folder.rglob("result.txt")

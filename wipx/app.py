@@ -77,7 +77,7 @@ def main() -> int:
         arguments = unambiguous(spelled_out(renamed(sys.argv[1:])))
         # Hydra does not read overrides on both sides of a flag.
         sys.argv[1:] = sorted(arguments, key=lambda argument: argument.startswith(FLAGS))
-        with watch_ended(), _composed_once():
+        with watch_ended(), _composed_once(arguments):
             hydra.main(version_base="1.3", config_path=str(configuration_folder()), config_name="config")(run)()
     except RunFailed as failure:
         return _report(failure.error, explanation(failure.error))
@@ -94,10 +94,14 @@ def main() -> int:
 
 
 @contextmanager
-def _composed_once() -> Iterator[None]:
-    """Keep Hydra from composing a configuration twice, the first time to see whether it asks for a sweep; -m does."""
+def _composed_once(arguments: list[str]) -> Iterator[None]:
+    """Keep Hydra from composing a configuration twice, the first time to see whether its hydra.mode asks for a sweep.
+
+    A sweep is asked for by -m, or by hydra.mode among the arguments.
+    """
     get_mode = Hydra.get_mode
-    Hydra.get_mode = lambda *_, **__: None
+    if not any(argument.startswith("hydra.mode=") for argument in arguments):
+        Hydra.get_mode = lambda *_, **__: None
     try:
         yield
     finally:
